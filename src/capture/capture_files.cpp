@@ -72,6 +72,17 @@ void CaptureFiles::report_reads() {
   });
 }
 
+void CaptureFiles::pass_over(const EventLogReader::Unwanted& unwanted) {
+  unwanted_ = unwanted;
+  log_.pass_over(unwanted_);
+}
+
+void CaptureFiles::begin_file(SealedLog log, int number) {
+  log_ = std::move(log);
+  log_.pass_over(unwanted_);
+  number_ = number;
+}
+
 bool CaptureFiles::next(LogEvent& event) {
   while (!log_.next(event)) {
     if (!open_following()) return false;
@@ -95,8 +106,7 @@ Result<void> CaptureFiles::go_to(const Place& place) {
   if (place.number != number_) {
     auto log = SealedLog::open(capture_file(first_, place.number), EventLogReader::Beginning::kMayBeDamaged);
     if (!log) return tl::unexpected<Error>(log.error());
-    log_ = std::move(*log);
-    number_ = place.number;
+    begin_file(std::move(*log), place.number);
   }
   log_.go_to(place.offset);
   return {};
@@ -156,8 +166,7 @@ bool CaptureFiles::open_following() {
     auto log = SealedLog::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
     if (!log) return false;
     finished_.push_back({number_, log_.health()});
-    log_ = std::move(*log);
-    number_ = number;
+    begin_file(std::move(*log), number);
     if (found->n_missing > 0 || found->beginning_is_damaged) breaks_.push_back(*found);
     report_reads();
     return true;

@@ -48,6 +48,9 @@ class CaptureFiles {
   /// Is told how much of the present file has been read, 0 to 1.
   void on_read(const std::function<void(double share)>& listener);
 
+  /// See SealedLog: what files() says then is of no use.
+  void pass_over(const EventLogReader::Unwanted& unwanted);
+
   /// Fetches the next event. Returns false at the end of the last file.
   [[nodiscard]] bool next(LogEvent& event);
 
@@ -74,9 +77,11 @@ class CaptureFiles {
   [[nodiscard]] std::optional<CaptureBreak> joins(int number) const;
   [[nodiscard]] std::optional<HostTime> t0_of_others() const;
   void report_reads();
+  void begin_file(SealedLog log, int number);
 
   std::filesystem::path first_;
   std::function<void(double)> on_read_;
+  EventLogReader::Unwanted unwanted_;
   int number_ = 0;
   SealedLog log_;
   bool at_beginning_ = true;

@@ -1,6 +1,8 @@
 #include "capture/capture_reader.h"
 
 #include <algorithm>
+#include <span>
+#include <string_view>
 #include <utility>
 
 #include "base/text.h"
@@ -127,25 +129,65 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
   return summary;
 }
 
+std::optional<RunHeader> run_header_of(const std::filesystem::path& path) {
+  auto log = CaptureFiles::open(path);
+  LogEvent event;
+  if (!log || !log->next(event)) return std::nullopt;
+  auto record = decode_record(event.data);
+  auto* run = record ? std::get_if<RunHeader>(&*record) : nullptr;
+  return run != nullptr ? std::optional(std::move(*run)) : std::nullopt;
+}
+
 Result<CaptureReader> CaptureReader::open(const std::filesystem::path& path, std::string device) {
   auto log = CaptureFiles::open(path);
   if (!log) return tl::unexpected(log.error());
+  if (!device.empty()) {
+    log->pass_over([device](std::span<const std::uint8_t> data) {
+      const std::string_view of = device_of_raw(data);
+      return !of.empty() && of != device;
+    });
+  }
   return CaptureReader(std::move(*log), std::move(device));
 }
 
 std::optional<RawRead> CaptureReader::next() {
+  RawRead read;
+  return next(read) ? std::optional(std::move(read)) : std::nullopt;
+}
+
+bool CaptureReader::next(RawRead& read) {
   while (!ended_ && held_bytes_ < kHeldMax &&
          (held_.empty() || newest_ - held_.front().key.arrival < kReorderWindow)) {
     ended_ = !read_one();
     if (ended_) close_assemblies();
   }
-  if (held_.empty()) return std::nullopt;
-  Held oldest = std::move(held_.front());
-  held_.pop_front();
+  if (held_.empty()) return false;
+  Held& oldest = held_.front();
   held_bytes_ -= cost_of(oldest.read);
   if (oldest.key.arrival < given_) disordered_ += 1;
   given_ = std::max(given_, oldest.key.arrival);
-  return std::move(oldest.read);
+  std::swap(read, oldest.read);
+  // What lines bring within the window; a read that is as long as a file is not kept.
+  constexpr std::size_t kSparesMost = 4096;
+  constexpr std::size_t kSpareBytesMost = 2048;
+  if (spares_.size() < kSparesMost && oldest.read.bytes.capacity() <= kSpareBytesMost)
+    spares_.push_back(std::move(oldest.read));
+  held_.pop_front();
+  return true;
+}
+
+RawRead CaptureReader::read_of(const RawView& piece) {
+  RawRead read;
+  if (!spares_.empty()) {
+    read = std::move(spares_.back());
+    spares_.pop_back();
+  }
+  read.device.assign(piece.device);
+  read.direction = piece.direction;
+  read.arrival = piece.arrival;
+  read.bytes.assign(piece.bytes.begin(), piece.bytes.end());
+  read.received = piece.received;
+  return read;
 }
 
 /// Takes in one event. Returns false at the end of the file.
@@ -167,13 +209,13 @@ void CaptureReader::add_piece(const RawView& piece) {
   Assembly& assembly = place->second;
   const bool follows = piece.sequence == assembly.next_sequence;
   assembly.next_sequence = piece.sequence + 1;
-  if (!assembly.open && !piece.continues) return add_whole(to_read(piece));
+  if (!assembly.open && !piece.continues) return add_whole(read_of(piece));
   if (assembly.open && follows) {
     auto& bytes = assembly.read.bytes;
     bytes.insert(bytes.end(), piece.bytes.begin(), piece.bytes.end());
   } else {
     if (assembly.open) add_whole(std::move(assembly.read));
-    assembly.read = to_read(piece);
+    assembly.read = read_of(piece);
   }
   // A read that never ends is damage: it is given as far as it goes.
   assembly.open = piece.continues && assembly.read.bytes.size() < kLongestRead;

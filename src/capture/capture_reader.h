@@ -67,6 +67,9 @@ struct CaptureSummary {
     const std::filesystem::path& path, const std::function<void(double share)>& progress = {},
     EventLogReader::Beginning beginning = EventLogReader::Beginning::kIsARecord);
 
+/// The run header, where the first file begins with one: known long before the whole capture is seen.
+[[nodiscard]] std::optional<RunHeader> run_header_of(const std::filesystem::path& path);
+
 /// Sums over the files; the index is of none.
 [[nodiscard]] LogHealth health_of(const std::vector<CapturedFile>& files);
 
@@ -89,6 +92,8 @@ class CaptureReader {
   /// The next read or write; nothing at the end of the capture. A read of which a piece was lost comes as the
   /// pieces that are there.
   [[nodiscard]] std::optional<RawRead> next();
+  /// The same, in the memory of one that is of no use any more: false at the end.
+  [[nodiscard]] bool next(RawRead& read);
 
   /// Reads that were out of order by more than the window.
   [[nodiscard]] std::uint64_t disordered() const noexcept { return disordered_; }
@@ -113,6 +118,7 @@ class CaptureReader {
   void add_piece(const RawView& piece);
   void close_assemblies();
   void add_whole(RawRead&& read);
+  RawRead read_of(const RawView& piece);
   std::size_t index_of(const std::string& device);
 
   CaptureFiles log_;
@@ -123,8 +129,9 @@ class CaptureReader {
     Key key;
     RawRead read;
   };
-  std::deque<Held> held_;  ///< rising; nearly all that comes belongs to its end
-  LogEvent event_;         ///< kept for its memory
+  std::deque<Held> held_;        ///< rising; nearly all that comes belongs to its end
+  LogEvent event_;               ///< kept for its memory
+  std::vector<RawRead> spares_;  ///< likewise
   std::size_t held_bytes_ = 0;
   std::uint64_t completed_ = 0;
   HostTime newest_ = HostTime::min();

@@ -47,6 +47,10 @@ constexpr std::array<std::uint8_t, sizeof kEventLogSync> kSyncWord{
     kEventLogSync >> 24U & 0xFFU, kEventLogSync >> 16U & 0xFFU, kEventLogSync >> 8U & 0xFFU,
     kEventLogSync & 0xFFU};
 
+std::span<const std::uint8_t> data_of(std::span<const std::uint8_t> record) {
+  return record.last(lengths_of(record.data()).data);
+}
+
 bool is_sync(const std::uint8_t* bytes) { return number_at<std::uint32_t>(bytes) == kEventLogSync; }
 
 bool is_text(const std::vector<std::uint8_t>& bytes) {
@@ -191,20 +195,25 @@ std::optional<std::size_t> EventLogReader::next_sure_record(std::size_t position
   return std::nullopt;
 }
 
-/// Whether a record lies in the buffer that another one follows: nearly always.
-bool EventLogReader::has_sure_record() const noexcept {
+/// There nearly always is one.
+std::size_t EventLogReader::sure_record() const noexcept {
   constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
   const std::size_t available = buffer_.size() - begin_;
   const std::uint8_t* at = buffer_.data() + begin_;
-  if (available < kEventLogHeaderBytes || !is_sync(at)) return false;
+  if (available < kEventLogHeaderBytes || !is_sync(at)) return 0;
   const Lengths lengths = lengths_of(at);
-  return lengths.plausible() && lengths.record() + kSyncBytes <= available && is_sync(at + lengths.record());
+  if (!lengths.plausible()) return 0;
+  const std::size_t length = lengths.record();
+  return length + kSyncBytes <= available && is_sync(at + length) ? length : 0;
 }
 
 bool EventLogReader::next(LogEvent& event) {
-  if (has_sure_record()) {
-    take(event);
-    return true;
+  while (const std::size_t length = sure_record()) {
+    if (!unwanted_ || !unwanted_(data_of({buffer_.data() + begin_, length}))) {
+      take(event);
+      return true;
+    }
+    begin_ += length;
   }
   while (ensure(1)) {
     std::size_t skip = 1;

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,6 +34,10 @@ class EventLogReader {
   /// Is told, now and then, how many bytes of the file have been read.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { on_read_ = std::move(listener); }
 
+  /// Events whose data nobody wants: passed over without a copy, but next to damage, where they are given.
+  using Unwanted = std::function<bool(std::span<const std::uint8_t> data)>;
+  void pass_over(Unwanted unwanted) { unwanted_ = std::move(unwanted); }
+
   /// Fetches the next event. Returns false at the end of the file.
   [[nodiscard]] bool next(LogEvent& event);
 
@@ -50,7 +55,8 @@ class EventLogReader {
   enum class Look : std::uint8_t { kRecord, kNoRecord, kCutOff };
 
   explicit EventLogReader(std::ifstream file) : file_(std::move(file)) {}
-  [[nodiscard]] bool has_sure_record() const noexcept;
+  /// Bytes of the record that lies whole in the buffer and that another one follows; 0 where there is none.
+  [[nodiscard]] std::size_t sure_record() const noexcept;
   bool ensure(std::size_t n);
   Look look_at(std::size_t position, std::size_t& length);
   bool may_begin_record(std::size_t position);
@@ -63,6 +69,7 @@ class EventLogReader {
   std::size_t begin_ = 0;
   std::uint64_t read_ = 0;  // of the file
   std::function<void(std::uint64_t)> on_read_;
+  Unwanted unwanted_;
   std::uint64_t bytes_skipped_ = 0;
   std::uint64_t bytes_cut_off_ = 0;
 };

@@ -243,6 +243,15 @@ bool is_raw(std::span<const std::uint8_t> message) noexcept {
   return message.size() > sizeof(std::int64_t) && fingerprint_of(message) == kFingerprint;
 }
 
+std::string_view device_of_raw(std::span<const std::uint8_t> message) noexcept {
+  if (!is_raw(message)) return {};
+  constexpr std::size_t kNameAt = 3 * sizeof(std::int64_t);  // behind fingerprint, utime and sequence
+  FieldReader fields(message.subspan(std::min(kNameAt, message.size())));
+  const auto device = fields.bytes(fields.number<std::int32_t>());  // and the zero at its end
+  if (device.empty()) return {};
+  return {reinterpret_cast<const char*>(device.data()), device.size() - 1};
+}
+
 RawRead to_read(const RawView& view) {
   return {std::string(view.device),
           view.direction,

@@ -69,6 +69,8 @@ struct RecordClock {
 
 /// Whether a message is one of device bytes, by what it says of itself.
 [[nodiscard]] bool is_raw(std::span<const std::uint8_t> message) noexcept;
+/// Whose bytes it has; empty where it is no such message.
+[[nodiscard]] std::string_view device_of_raw(std::span<const std::uint8_t> message) noexcept;
 [[nodiscard]] RawRead to_read(const RawView& view);
 
 }  // namespace imuscope

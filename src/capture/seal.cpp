@@ -8,6 +8,7 @@
 #include "base/contracts.h"
 #include "capture/event_log.h"
 #include "capture/fingerprint.h"
+#include "capture/record_codec.h"
 #include "publish/message_codec.h"
 
 namespace imuscope {
@@ -42,11 +43,13 @@ std::optional<Message> decode_checked(std::span<const std::uint8_t> bytes) {
   return checksum == message->checksum ? std::move(message) : std::nullopt;
 }
 
+bool is_of_device(std::string_view channel) { return channel.find("_RAW_") != std::string_view::npos; }
+
 /// A device's name comes after the kind: a device called SEAL is none.
 bool is_of_kind(std::string_view channel, std::string_view kind) {
   if (!channel.ends_with(kind)) return false;
   channel.remove_suffix(kind.size());
-  return channel.ends_with('_') && channel.find("_RAW_") == std::string_view::npos;
+  return channel.ends_with('_') && !is_of_device(channel);
 }
 
 }  // namespace
@@ -115,5 +118,7 @@ bool is_seal_or_index(const LogEvent& event) {
   return claims_to_be<capture_seal_t>(event.data) || claims_to_be<capture_index_t>(event.data) ||
          is_of_kind(event.channel, kSealKind) || is_of_kind(event.channel, kIndexKind);
 }
+
+bool is_surely_no_seal(const LogEvent& event) { return is_raw(event.data) && is_of_device(event.channel); }
 
 }  // namespace imuscope

@@ -57,5 +57,7 @@ class Sealer {
 
 /// Whether a record claims to be a seal or an index, by its message or its channel.
 [[nodiscard]] bool is_seal_or_index(const LogEvent& event);
+/// Of device bytes, as nearly all are: told by one look, and neither of the two.
+[[nodiscard]] bool is_surely_no_seal(const LogEvent& event);
 
 }  // namespace imuscope

@@ -83,6 +83,7 @@ void SealedLog::take(LogEvent&& event) {
   // An index is the last of its file: one that something follows was copied from another.
   health_.index.reset();
   if (index_) hold(std::move(*std::exchange(index_, std::nullopt)));
+  if (is_surely_no_seal(event)) return hold(std::move(event));
   const auto seal = decode_seal(event.data);
   auto index = decode_index(event.data);
   // What was played and recorded anew, as by lcm-logger, has other stamps and numbers: its seals are of the

@@ -45,6 +45,10 @@ class SealedLog {
   /// See EventLogReader.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { log_.on_read(std::move(listener)); }
 
+  /// See EventLogReader. Records that nobody wants are not held against their seal either, and count as missing in
+  /// health().
+  void pass_over(EventLogReader::Unwanted unwanted) { log_.pass_over(std::move(unwanted)); }
+
   /// Fetches the next record. Returns false at the end of the file.
   [[nodiscard]] bool next(LogEvent& event);
 

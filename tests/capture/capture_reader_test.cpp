@@ -268,6 +268,55 @@ TEST(CaptureReader, OneDeviceAloneIsWhatTheWholeHoldsOfIt) {
   EXPECT_TRUE(read_all(*none).empty());
 }
 
+/// What the others sent is not even looked at, which may not change what is taken for damage.
+TEST(CaptureReader, OneDeviceAloneIsWhatTheWholeHoldsOfItWhateverIsDamaged) {
+  const auto folder = test::scratch_folder();
+  const auto path = folder / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  for (std::int64_t i = 0; i < 400; ++i) {
+    const auto byte = static_cast<std::uint8_t>(i);
+    capture.chunk(static_cast<DeviceIndex>(i % 2), i / 2, 10 * i, {byte, 7, 8}, i % 7 == 0);
+    if (i % 50 == 3) capture.foreign({1, 2, 3});
+  }
+  capture.done();
+  std::ifstream file(path, std::ios::binary);
+  const std::string good((std::istreambuf_iterator<char>(file)), {});
+  std::mt19937 random(11);
+  std::size_t lost = 0;
+  for (int i = 0; i < 300; ++i) {
+    std::string bad = good;
+    const auto place = std::uniform_int_distribution<std::size_t>(200, good.size() - 1)(random);
+    const auto length = std::min<std::size_t>(1U << (i % 10U), good.size() - place);
+    switch (i % 3) {
+      case 0:
+        bad[place] = static_cast<char>(bad[place] ^ (1 << (i % 8)));
+        break;
+      case 1:
+        bad.erase(place, length);
+        break;
+      default:
+        bad.insert(place, good.substr(good.size() - place > length ? place : 0, length));
+    }
+    const auto damaged = folder / "damaged.lcm";
+    std::ofstream(damaged, std::ios::binary) << bad;
+    auto whole = CaptureReader::open(damaged);
+    auto alone = CaptureReader::open(damaged, "mtx1");
+    ASSERT_TRUE(whole && alone);
+    std::vector<RawRead> expected = read_all(*whole);
+    std::erase_if(expected, [](const RawRead& read) { return read.device != "mtx1"; });
+    const std::vector<RawRead> reads = read_all(*alone);
+    ASSERT_EQ(reads.size(), expected.size()) << i;
+    for (std::size_t k = 0; k < reads.size(); ++k) {
+      EXPECT_EQ(reads[k].device, "mtx1");
+      EXPECT_EQ(reads[k].arrival, expected[k].arrival) << i;
+      EXPECT_EQ(reads[k].bytes, expected[k].bytes) << i;
+    }
+    lost += reads.size() < 172 ? 1U : 0U;
+  }
+  EXPECT_GT(lost, 50U) << "the damage is such";
+}
+
 TEST(CaptureReader, IsInOrderWhenOneRingIsRecordedSecondsAfterTheOther) {
   const auto path = test::scratch_folder() / "capture.lcm";
   Capture capture(path);

@@ -61,7 +61,7 @@ TEST(AxesSink, OnTheDiskSaysWhatInMemoryIsSaid) {
     // Short ones are in memory either way.
     const bool is_on_disk = static_cast<bool>(on_disk->fetches[0]);
     ASSERT_EQ(in_memory->temperature_c != nullptr,
-              is_on_disk ? static_cast<bool>(on_disk->fetch_temperature) : on_disk->temperature_c != nullptr);
+              is_on_disk ? static_cast<bool>(on_disk->read_tempered[0]) : on_disk->temperature_c != nullptr);
     for (std::size_t axis = 0; axis < kMessageAxes.size(); ++axis) {
       const Signal& signal = in_memory->axes[axis];
       if (!on_disk->fetches[axis]) continue;  // short enough
@@ -76,14 +76,25 @@ TEST(AxesSink, OnTheDiskSaysWhatInMemoryIsSaid) {
         }
       }
     }
-    if (!on_disk->fetch_temperature) continue;
-    const auto temperature_c = on_disk->fetch_temperature();
-    ASSERT_TRUE(temperature_c);
-    ASSERT_EQ(temperature_c->size(), in_memory->temperature_c->size());
-    for (std::size_t i = 0; i < temperature_c->size(); ++i) {
-      const float a = (*temperature_c)[i];
-      const float b = (*in_memory->temperature_c)[i];
-      ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i;
+    if (!on_disk->read_tempered[0]) continue;
+    for (std::size_t axis = 0; axis < kMessageAxes.size(); ++axis) {
+      const Signal& signal = in_memory->axes[axis];
+      std::size_t i = 0;
+      const auto done = on_disk->read_tempered[axis]([&](const certificate::TemperedPiece& piece) {
+        ASSERT_EQ(piece.temperature_c.size(), piece.x.size());
+        for (std::size_t k = 0; k < piece.x.size(); ++k, ++i) {
+          ASSERT_LT(i, signal.values.size());
+          const float a = piece.temperature_c[k];
+          const float b = (*in_memory->temperature_c)[i];
+          ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i;
+          ASSERT_EQ(std::isnan(piece.x[k]), signal.mask[i] == 0) << i;
+          if (signal.mask[i] != 0) {
+            ASSERT_EQ(piece.x[k], signal.values[i]) << i;
+          }
+        }
+      });
+      ASSERT_TRUE(done);
+      EXPECT_EQ(i, signal.values.size());
     }
   }
 }

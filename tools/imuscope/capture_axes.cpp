@@ -4,11 +4,16 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <future>
+#include <optional>
 #include <string>
+#include <utility>
 
+#include "capture/capture_reader.h"
 #include "sample_axes.h"
 #include "service/pipeline/device_factory.h"
 #include "service/recording/byte_source.h"
+#include "service/recording/decoded_reads.h"
 #include "service/recording/recording.h"
 #include "service/recording/side_by_side.h"
 
@@ -16,23 +21,22 @@ namespace imuscope::cli {
 namespace {
 
 /// Decodes one device of a capture from its first byte to its last, while another thread reads ahead.
-Result<void> decode(const std::filesystem::path& capture, const OpenedRecording& opened, std::size_t device,
-                    SampleSink& sink) {
-  const auto index = static_cast<DeviceIndex>(device);
-  const auto& devices = opened.configuration.devices;
+Result<void> decode(const std::filesystem::path& capture, const Configuration& configuration,
+                    std::size_t device, SampleSink& sink) {
+  const auto& devices = configuration.devices;
   constexpr std::uint64_t kNobodyAsksHowFar = 0;
   auto source = open_captured_device(capture, devices[devices[device].line_owner].name, kNobodyAsksHowFar,
                                      reading_by_threads());
   if (!source) return tl::unexpected<Error>(source.error());
-  const auto decoder = make_decoder(devices[device], index, opened.recording.clocks[device].map);
-  while (true) {
-    const auto read = (*source)->next();
+  // The stamps of a capture are of one clock.
+  auto decoder = make_decoder(devices[device], static_cast<DeviceIndex>(device), {});
+  DecodedReads reads(std::move(*source), std::move(decoder), false);
+  for (;;) {
+    const auto read = reads.next();
     if (!read) return tl::unexpected<Error>(read.error());
-    if (!*read) break;
-    decoder->push((*read)->bytes, (*read)->arrival.value_or(HostTime{}), sink);
+    if (!*read) return {};
+    for (const Sample& sample : (*read)->samples) sink.on_sample(sample);
   }
-  decoder->finish(HostTime{}, sink);
-  return {};
 }
 
 bool is_imu(const DeviceConfig& device) {
@@ -56,10 +60,37 @@ SensorRecord record_of(const std::filesystem::path& file, const std::string& dev
     axis.mask = std::move(signal.mask);
     axis.fetch = std::move(read.fetches[i]);
     axis.temperature_c = read.temperature_c;
-    axis.fetch_temperature = read.fetch_temperature;
+    axis.read_tempered = std::move(read.read_tempered[i]);
     sensor.axes.push_back(std::move(axis));
   }
   return sensor;
+}
+
+bool is_wanted(const DeviceConfig& device, const RecordChoice& choice) {
+  return is_imu(device) && (choice.imu.empty() || device.name == choice.imu);
+}
+
+/// An IMU whose samples were gathered.
+struct Gathered {
+  std::size_t device;
+  AxesSink sink{AxesSink::Keeps::kLongOnesOnDisk};
+  Result<void> done{};
+};
+
+/// The first IMU that is wanted, by the configuration that the capture begins with, as long as another thread sees
+/// through the whole of it; nothing where that cannot be.
+std::optional<Gathered> gather_ahead(const std::filesystem::path& file, const RecordChoice& choice) {
+  const auto run = may_use_threads() ? run_header_of(file) : std::nullopt;
+  if (!run) return std::nullopt;
+  const auto configuration = parse_configuration(run->configuration, run->name);
+  if (!configuration) return std::nullopt;
+  const auto& devices = configuration->devices;
+  const auto at =
+      std::ranges::find_if(devices, [&](const DeviceConfig& device) { return is_wanted(device, choice); });
+  if (at == devices.end()) return std::nullopt;
+  Gathered ahead{static_cast<std::size_t>(at - devices.begin())};
+  ahead.done = decode(file, *configuration, ahead.device, ahead.sink);
+  return ahead;
 }
 
 }  // namespace
@@ -68,7 +99,10 @@ bool is_capture(const std::filesystem::path& file) { return file.extension() == 
 
 Result<std::vector<SensorRecord>> read_capture_axes(const std::filesystem::path& file,
                                                     const RecordChoice& choice) {
-  const auto opened = open_recording({file.string()}, std::nullopt);
+  auto seen = std::async(may_use_threads() ? std::launch::async : std::launch::deferred,
+                         [&file] { return open_recording({file.string()}, std::nullopt); });
+  auto ahead = gather_ahead(file, choice);
+  const auto opened = seen.get();
   if (!opened) return tl::unexpected<Error>(opened.error());
   const auto& devices = opened->configuration.devices;
   std::vector<std::string> names;
@@ -84,12 +118,16 @@ Result<std::vector<SensorRecord>> read_capture_axes(const std::filesystem::path&
   std::vector<SensorRecord> records;
   for (std::size_t i = 0; i < devices.size(); ++i) {
     const std::string& name = devices[i].name;
-    if (!is_imu(devices[i]) || !opened->recording.present[i]) continue;
-    if (!choice.imu.empty() && name != choice.imu) continue;
-    AxesSink sink(AxesSink::Keeps::kLongOnesOnDisk);
-    if (auto decoded = decode(file, *opened, i, sink); !decoded) return tl::unexpected(decoded.error());
-    if (sink.empty()) continue;
-    auto read = std::move(sink).axes(choice.signal.rate_hz);
+    if (!is_wanted(devices[i], choice) || !opened->recording.present[i]) continue;
+    Gathered gathered{i};
+    if (ahead && ahead->device == i) {
+      gathered = *std::exchange(ahead, std::nullopt);
+    } else {
+      gathered.done = decode(file, opened->configuration, i, gathered.sink);
+    }
+    if (!gathered.done) return tl::unexpected(gathered.done.error());
+    if (gathered.sink.empty()) continue;
+    auto read = std::move(gathered.sink).axes(choice.signal.rate_hz);
     if (!read) {
       Error error = read.error();
       error.what = fmt::format("{}, {}: {}", file.string(), name, error.what);

@@ -67,18 +67,60 @@ Result<std::vector<Value>> filled(const RowPlaces& places, Read&& read) {
   return out;
 }
 
-/// Rows of a spool as floats, piece by piece.
-Result<void> read_floats(const Spool& spool, std::size_t first, std::span<float> values) {
-  constexpr std::size_t kPiece = std::size_t{1} << 16U;
-  std::vector<double> piece(std::min(values.size(), kPiece));
-  for (std::size_t at = 0; at < values.size(); at += kPiece) {
-    const auto part = std::span(piece).first(std::min(kPiece, values.size() - at));
-    if (auto done = spool.read(first + at, part); !done) return done;
-    std::ranges::transform(part, values.begin() + static_cast<std::ptrdiff_t>(at),
-                           [](double v) { return static_cast<float>(v); });
+/// An axis with its temperatures, piece by piece, and NaN where samples are missing.
+class Tempered {
+ public:
+  using Take = std::function<void(const certificate::TemperedPiece&)>;
+
+  Tempered(const RowPlaces& places, const Spool& axis, const Spool& temperature, const Take& take)
+      : places_(places), axis_(axis), temperature_(temperature), take_(take) {}
+
+  Result<void> read() {
+    std::size_t row = 0;
+    for (const Hole& hole : places_.holes) {
+      if (auto done = rows(row, hole.before_row); !done) return done;
+      row = hole.before_row;
+      missing(hole.samples);
+    }
+    return rows(row, places_.rows);
   }
-  return {};
-}
+
+ private:
+  static constexpr std::size_t kPiece = std::size_t{1} << 16U;
+
+  Result<void> rows(std::size_t begin, std::size_t end) {
+    for (std::size_t n = 0; begin < end; begin += n) {
+      n = std::min(kPiece, end - begin);
+      x_.resize(n);
+      t_.resize(n);
+      if (auto done = axis_.read(begin, x_); !done) return done;
+      if (auto done = temperature_.read(begin, t_); !done) return done;
+      give(t_);
+    }
+    return {};
+  }
+  void missing(std::size_t samples) {
+    for (std::size_t n = 0; samples > 0; samples -= n) {
+      n = std::min(kPiece, samples);
+      x_.assign(n, kNan);
+      give(x_);
+    }
+  }
+  void give(const std::vector<double>& temperature_c) {
+    t_as_float_.resize(temperature_c.size());
+    std::ranges::transform(temperature_c, t_as_float_.begin(),
+                           [](double t) { return static_cast<float>(t); });
+    take_({x_, {}, t_as_float_});
+  }
+
+  const RowPlaces& places_;
+  const Spool& axis_;
+  const Spool& temperature_;
+  const Take& take_;
+  std::vector<double> x_;
+  std::vector<double> t_;
+  std::vector<float> t_as_float_;
+};
 
 /// A sensor's clock drifts by far less in a day; what differs by more was set to another rate.
 constexpr double kDriftMost = 0.01;
@@ -195,19 +237,17 @@ Result<SampleAxes> AxesSink::axes_on_disk(std::optional<double> rate_hz) {
   if (!found) return tl::unexpected<Error>(found.error());
   const auto places = std::make_shared<const RowPlaces>(std::move(*found));
   SampleAxes out;
-  if (has_temperature) {
-    out.fetch_temperature = [places,
-                             spool = std::make_shared<const Spool>(std::move(spools_[kTemperature]))] {
-      return filled<float>(*places, [&](std::size_t first, std::span<float> values) {
-        return read_floats(*spool, first, values);
-      });
-    };
-  }
+  const auto temperature = std::make_shared<const Spool>(std::move(spools_[kTemperature]));
   for (std::size_t axis = 0; axis < out.axes.size(); ++axis) {
+    const auto spool = std::make_shared<const Spool>(std::move(spools_[axis]));
     out.axes[axis].rate_hz = places->rate_hz;
-    out.fetches[axis] = [places, spool = std::make_shared<const Spool>(std::move(spools_[axis]))] {
+    out.fetches[axis] = [places, spool] {
       return filled<double>(
           *places, [&](std::size_t first, std::span<double> values) { return spool->read(first, values); });
+    };
+    if (!has_temperature) continue;
+    out.read_tempered[axis] = [places, spool, temperature](const Tempered::Take& take) {
+      return Tempered(*places, *spool, *temperature, take).read();
     };
   }
   return out;

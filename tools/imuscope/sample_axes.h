@@ -28,7 +28,8 @@ struct SampleAxes {
   std::array<bool, kMessageAxes.size()> is_sent{};  ///< at least one sample has it
   /// One a sample, the last that was sent; null: none.
   std::shared_ptr<const std::vector<float>> temperature_c{};
-  certificate::FetchTemperatures fetch_temperature{};  ///< in its place, of samples that lie on the disk
+  /// In its place, of samples that lie on the disk: with those of an axis.
+  std::array<certificate::ReadTempered, kMessageAxes.size()> read_tempered;
 };
 
 /// Takes an IMU's samples, in order, and keeps what the axes need of them.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <future>
 #include <iterator>
 #include <mutex>
@@ -81,14 +82,18 @@ Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisR
 /// @param x  used up
 std::vector<noise::WaveletVariance> halves_of(std::span<double> x, std::span<const std::uint8_t> mask) {
   const std::size_t middle = x.size() / 2;
-  std::vector<noise::WaveletVariance> halves;
-  for (const auto& [begin, end] : {std::pair{std::size_t{0}, middle}, std::pair{middle, x.size()}}) {
+  const std::array parts{std::pair{std::size_t{0}, middle}, std::pair{middle, x.size()}};
+  std::vector<noise::WaveletVariance> halves(parts.size());
+  std::array<bool, parts.size()> is_there{};
+  on_all_cores(parts.size(), [&](std::size_t i) {
+    const auto [begin, end] = parts[i];
     noise::WvOptions options;
     options.mask = mask.subspan(begin, end - begin);
     auto half = noise::haar_wavelet_variance_in_place(x.subspan(begin, end - begin), options);
-    if (!half) return {};
-    halves.push_back(std::move(*half));
-  }
+    is_there[i] = half.has_value();
+    if (half) halves[i] = std::move(*half);
+  });
+  if (!std::ranges::all_of(is_there, std::identity{})) return {};
   return halves;
 }
 
@@ -177,8 +182,6 @@ Result<void> look_at(const AxisRecord& record, std::span<const double> x, std::s
     return tl::unexpected(named(record, {ErrorKind::kWork, fmt::format("all values are {:.6g}", out.mean),
                                          "the axis is stuck, or the wrong column was chosen"}));
   }
-  out.resolution = resolution_of(x, mask);
-  out.warnings = record_warnings(record, x, mask, out);
   return {};
 }
 
@@ -189,7 +192,7 @@ struct Kept {
   noise::TailExcerpt tails;
 };
 
-/// What spectra tell; takes the lines out of `x`.
+/// What spectra tell, and beside them what is wrong with the record; takes the lines out of `x`.
 /// @return of the lines
 noise::Remainders look_at_spectra(const AxisRecord& record, std::span<double> x,
                                   std::span<const std::uint8_t> mask, double confidence,
@@ -199,7 +202,13 @@ noise::Remainders look_at_spectra(const AxisRecord& record, std::span<double> x,
   noise::Spectra spectra(x, mask);
   std::vector<std::size_t> lengths = segments_of_lines(spectra, line_options);
   std::ranges::copy(segments_of_density(spectra), std::back_inserter(lengths));
-  spectra.make(lengths, on_all_cores);
+  spectra.make(lengths, [&](std::size_t n, const std::function<void(std::size_t)>& make) {
+    on_all_cores(n + 1, [&](std::size_t i) {
+      if (i < n) return make(i);
+      out.resolution = resolution_of(x, mask);
+      out.warnings = record_warnings(record, x, mask, out);
+    });
+  });
   out.lines = find_lines(spectra, line_options);
   out.density = density_of(spectra, record.rate_hz, confidence);  // with the lines
   if (!out.lines.empty()) {
@@ -287,14 +296,16 @@ Result<AxisCertificate> modelled(Reduced&& axis, const AxisRecord& record, const
 
 /// What only the samples and the model together tell.
 Result<AxisCertificate> with_temperature(Result<AxisCertificate>&& axis, const AxisRecord& record) {
-  if (!axis || (record.temperature_c == nullptr && !record.fetch_temperature)) return std::move(axis);
-  const auto x = samples_of(record);
-  if (!x) return tl::unexpected(named(record, x.error()));
-  const Result<std::vector<float>> fetched =
-      record.fetch_temperature ? record.fetch_temperature() : std::vector<float>{};
-  if (!fetched) return tl::unexpected(named(record, fetched.error()));
-  const std::span<const float> t = record.fetch_temperature ? *fetched : *record.temperature_c;
-  axis->temperature = temperature_of(*x, record.mask, t, axis->fit);
+  if (!axis || (record.temperature_c == nullptr && !record.read_tempered)) return std::move(axis);
+  if (!record.read_tempered) {
+    const auto x = samples_of(record);
+    if (!x) return tl::unexpected(named(record, x.error()));
+    axis->temperature = temperature_of(*x, record.mask, *record.temperature_c, axis->fit);
+    return std::move(axis);
+  }
+  auto temperature = temperature_of(record.read_tempered, axis->fit);
+  if (!temperature) return tl::unexpected(named(record, temperature.error()));
+  axis->temperature = *temperature;
   return std::move(axis);
 }
 
@@ -315,12 +326,12 @@ void characterize_fetched(std::span<const AxisRecord> records, const AxisOptions
         std::launch::async,
         [&](Result<Reduced>&& axis) -> Result<AxisCertificate> {
           if (!axis) return tl::unexpected(axis.error());
-          return modelled(std::move(*axis), record, options, covariances);
+          return with_temperature(modelled(std::move(*axis), record, options, covariances), record);
         },
         reduced(record, options.confidence)));
   }
   for (std::size_t i = 0; i < records.size(); ++i) {
-    out[i] = with_temperature(models[i].get(), records[i]);
+    out[i] = models[i].get();
     if (told) told(i + 1);
   }
 }

@@ -27,9 +27,6 @@ namespace imuscope::certificate {
 /// Hands out the samples of an axis. Asked several times, by one thread at a time.
 using FetchSamples = std::function<Result<std::vector<double>>()>;
 
-/// Hands out temperatures, one a sample, likewise.
-using FetchTemperatures = std::function<Result<std::vector<float>>()>;
-
 /// One axis as recorded.
 struct AxisRecord {
   std::string name;  ///< "gyro_x"
@@ -41,8 +38,8 @@ struct AxisRecord {
   std::shared_ptr<const std::vector<float>> temperature_c{};
   /// In place of `values`, of a record that is too long to lie in memory as a whole.
   FetchSamples fetch{};
-  /// In place of `temperature_c`, of such a record.
-  FetchTemperatures fetch_temperature{};
+  /// In place of `temperature_c`, of such a record: samples and temperatures.
+  ReadTempered read_tempered{};
 };
 
 /// Do the two halves of the record come from one model?
@@ -96,7 +93,7 @@ using AxisDone = std::function<void(std::size_t done)>;
 
 /// Axes side by side on all cores; the result does not depend on their number. One entry a record, in order.
 /// Records that are fetched are taken one after the other: no more than one of them is in memory, while models
-/// of those before are looked for.
+/// of those before are looked for, and their temperatures.
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
                                                        const AxisOptions& options, const AxisDone& told = {});
 

@@ -16,29 +16,29 @@ namespace {
 constexpr std::size_t kWindows = 40;
 constexpr std::size_t kLeastWindow = 500;
 
+bool is_there(const TemperedPiece& piece, std::size_t i) {
+  return (piece.mask.empty() || piece.mask[i] != 0) && std::isfinite(piece.x[i]) &&
+         std::isfinite(piece.temperature_c[i]);
+}
+
 struct Range {
   double mean = 0.0;
   double lowest = 0.0;
   double highest = 0.0;
-  std::size_t n = 0;
-};
+  std::size_t n = 0;        ///< samples that are there
+  std::size_t samples = 0;  ///< all
 
-bool is_there(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const float> t,
-              std::size_t i) {
-  return (mask.empty() || mask[i] != 0) && std::isfinite(x[i]) && std::isfinite(t[i]);
-}
-
-Range range_of(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const float> t) {
-  Range range;
-  for (std::size_t i = 0; i < t.size(); ++i) {
-    if (!is_there(x, mask, t, i)) continue;
-    const auto now = static_cast<double>(t[i]);
-    range.lowest = range.n == 0 ? now : std::min(range.lowest, now);
-    range.highest = range.n == 0 ? now : std::max(range.highest, now);
-    range.mean += (now - range.mean) / static_cast<double>(++range.n);
+  void add(const TemperedPiece& piece) {
+    for (std::size_t i = 0; i < piece.x.size(); ++i) {
+      if (!is_there(piece, i)) continue;
+      const auto now = static_cast<double>(piece.temperature_c[i]);
+      lowest = n == 0 ? now : std::min(lowest, now);
+      highest = n == 0 ? now : std::max(highest, now);
+      mean += (now - mean) / static_cast<double>(++n);
+    }
+    samples += piece.x.size();
   }
-  return range;
-}
+};
 
 /// Least-squares line through (x, y) with the sd of its slope from the scatter; absent with fewer than three
 /// places.
@@ -74,66 +74,96 @@ std::optional<Slope> slope_of(const std::vector<double>& x, const std::vector<do
 }
 
 /// Bias by generalised least squares: both columns go through the noise's own whitening filter (T-2).
-void add_bias(Temperature& out, std::span<const double> x, std::span<const std::uint8_t> mask,
-              std::span<const float> t, const noise::Model& model) {
-  constexpr std::size_t kColumns = 3;  // signal, constant, temperature
-  noise::Whitener whitener(model, kColumns);
-  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d right = Eigen::Vector2d::Zero();
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (!is_there(x, mask, t, i)) {
-      whitener.skip();
-      continue;
+class BiasSlope {
+ public:
+  BiasSlope(const noise::Model& model, double mean_c) : whitener_(model, kColumns), mean_c_(mean_c) {}
+
+  void add(const TemperedPiece& piece) {
+    for (std::size_t i = 0; i < piece.x.size(); ++i) {
+      if (!is_there(piece, i)) {
+        whitener_.skip();
+        continue;
+      }
+      std::array<double, kColumns> row{piece.x[i], 1.0,
+                                       static_cast<double>(piece.temperature_c[i]) - mean_c_};
+      if (!whitener_.push(row)) continue;
+      const Eigen::Vector2d a(row[1], row[2]);
+      normal_ += a * a.transpose();
+      right_ += a * row[0];
     }
-    std::array<double, kColumns> row{x[i], 1.0, static_cast<double>(t[i]) - out.mean_c};
-    if (!whitener.push(row)) continue;
-    const Eigen::Vector2d a(row[1], row[2]);
-    normal += a * a.transpose();
-    right += a * row[0];
   }
-  const Eigen::LDLT<Eigen::Matrix2d> ldlt(normal);
-  const Eigen::Matrix2d covariance = ldlt.solve(Eigen::Matrix2d::Identity());
-  out.bias_per_c = ldlt.solve(right)[1];
-  out.bias_per_c_sd = std::sqrt(std::max(0.0, covariance(1, 1)));
-  if (out.bias_per_c_sd > 0.0) {
-    const double z = std::abs(out.bias_per_c) / out.bias_per_c_sd;
-    out.bias_p_value = 2.0 * boost::math::cdf(boost::math::complement(boost::math::normal(), z));
+
+  void tell(Temperature& out) const {
+    const Eigen::LDLT<Eigen::Matrix2d> ldlt(normal_);
+    const Eigen::Matrix2d covariance = ldlt.solve(Eigen::Matrix2d::Identity());
+    out.bias_per_c = ldlt.solve(right_)[1];
+    out.bias_per_c_sd = std::sqrt(std::max(0.0, covariance(1, 1)));
+    if (out.bias_per_c_sd > 0.0) {
+      const double z = std::abs(out.bias_per_c) / out.bias_per_c_sd;
+      out.bias_p_value = 2.0 * boost::math::cdf(boost::math::complement(boost::math::normal(), z));
+    }
   }
-}
+
+ private:
+  static constexpr std::size_t kColumns = 3;  // signal, constant, temperature
+  noise::Whitener whitener_;
+  double mean_c_;
+  Eigen::Matrix2d normal_ = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right_ = Eigen::Vector2d::Zero();
+};
 
 /// T-2: logarithm of the mean square of successive differences, window by window, on the windows' temperature.
-void add_noise(Temperature& out, std::span<const double> x, std::span<const std::uint8_t> mask,
-               std::span<const float> t) {
-  const std::size_t length = x.size() / kWindows;
-  if (length < kLeastWindow) return;
-  std::vector<double> temperature;
-  std::vector<double> log_variance;
-  for (std::size_t w = 0; w < kWindows; ++w) {
-    double square = 0.0;
-    double mean_t = 0.0;
-    std::size_t n = 0;
-    for (std::size_t i = w * length + 1; i < (w + 1) * length; ++i) {
-      if (!is_there(x, mask, t, i) || !is_there(x, mask, t, i - 1)) continue;
-      square += (x[i] - x[i - 1]) * (x[i] - x[i - 1]);
-      mean_t += static_cast<double>(t[i]);
-      ++n;
+class NoiseSlope {
+ public:
+  explicit NoiseSlope(std::size_t samples) : length_(samples / kWindows) {}
+
+  void add(const TemperedPiece& piece) {
+    if (length_ < kLeastWindow) return;
+    for (std::size_t i = 0; i < piece.x.size(); ++i) {
+      const std::optional<double> now = is_there(piece, i) ? std::optional(piece.x[i]) : std::nullopt;
+      if (at_ % length_ != 0 && now && before_) {
+        square_ += (*now - *before_) * (*now - *before_);
+        sum_c_ += static_cast<double>(piece.temperature_c[i]);
+        ++n_;
+      }
+      before_ = now;
+      if (++at_ % length_ == 0) end_window();
     }
-    if (n < kLeastWindow / 2 || !(square > 0.0)) continue;
-    temperature.push_back(mean_t / static_cast<double>(n));
-    log_variance.push_back(std::log(square / static_cast<double>(n)));
   }
-  if (const auto slope = slope_of(temperature, log_variance)) {
+
+  void tell(Temperature& out) const {
+    const auto slope = slope_of(temperature_c_, log_variance_);
+    if (!slope) return;
     out.noise_per_c = slope->value;
     out.noise_per_c_sd = slope->sd;
   }
-}
+
+ private:
+  void end_window() {
+    if (at_ <= kWindows * length_ && n_ >= kLeastWindow / 2 && square_ > 0.0) {
+      temperature_c_.push_back(sum_c_ / static_cast<double>(n_));
+      log_variance_.push_back(std::log(square_ / static_cast<double>(n_)));
+    }
+    square_ = sum_c_ = 0.0;
+    n_ = 0;
+  }
+
+  std::size_t length_;
+  std::size_t at_ = 0;
+  std::optional<double> before_;
+  double square_ = 0.0;  ///< of differences within the window
+  double sum_c_ = 0.0;
+  std::size_t n_ = 0;
+  std::vector<double> temperature_c_;
+  std::vector<double> log_variance_;
+};
 
 }  // namespace
 
-std::optional<Temperature> temperature_of(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                          std::span<const float> temperature_c, const noise::FitResult& fit) {
-  if (temperature_c.size() != x.size()) return std::nullopt;
-  const Range range = range_of(x, mask, temperature_c);
+Result<std::optional<Temperature>> temperature_of(const ReadTempered& read, const noise::FitResult& fit) {
+  Range range;
+  if (auto done = read([&](const TemperedPiece& piece) { range.add(piece); }); !done)
+    return tl::unexpected(done.error());
   if (range.n == 0 || range.highest - range.lowest < kLeastRange_c) return std::nullopt;
   const auto& terms = fit.model.components;
   if (std::ranges::none_of(terms, [](const auto& term) { return term.amplitude > 0.0; })) return std::nullopt;
@@ -141,9 +171,27 @@ std::optional<Temperature> temperature_of(std::span<const double> x, std::span<c
   out.mean_c = range.mean;
   out.lowest_c = range.lowest;
   out.highest_c = range.highest;
-  add_bias(out, x, mask, temperature_c, fit.model);
-  add_noise(out, x, mask, temperature_c);
+  BiasSlope bias(fit.model, out.mean_c);
+  NoiseSlope noise(range.samples);
+  const auto take = [&](const TemperedPiece& piece) {
+    bias.add(piece);
+    noise.add(piece);
+  };
+  if (auto done = read(take); !done) return tl::unexpected(done.error());
+  bias.tell(out);
+  noise.tell(out);
   return out;
+}
+
+std::optional<Temperature> temperature_of(std::span<const double> x, std::span<const std::uint8_t> mask,
+                                          std::span<const float> temperature_c, const noise::FitResult& fit) {
+  if (temperature_c.size() != x.size()) return std::nullopt;
+  const TemperedPiece all{x, mask, temperature_c};
+  const auto read = [&all](const std::function<void(const TemperedPiece&)>& take) -> Result<void> {
+    take(all);
+    return {};
+  };
+  return *temperature_of(read, fit);
 }
 
 }  // namespace imuscope::certificate

@@ -102,6 +102,8 @@ void Spectra::make(std::span<const std::size_t> lengths, const ForEachIndex& for
     const auto [at, is_new] = made_.try_emplace(length);
     if (is_new) empty.push_back(&*at);
   }
+  // The longest take longest: begun last, they would be waited for.
+  std::ranges::sort(empty, [](const auto* a, const auto* b) { return a->first > b->first; });
   for_each(empty.size(),
            [&](std::size_t i) { empty[i]->second = spectrum_of(x_, present_, empty[i]->first); });
 }

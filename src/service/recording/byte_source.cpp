@@ -55,28 +55,30 @@ class RawDumpSource final : public ByteSource {
   std::span<const std::uint8_t> rest_;
 };
 
+/// Gives the next read or write, in the memory of one that is of no use any more; false at the end.
+using TakeRead = std::function<bool(RawRead& read)>;
+
 /// The reads of several devices, taken from one pass over a capture and kept until they are asked for.
 class SharedReads {
  public:
-  /// @param take  the next of the capture, of any device
-  SharedReads(std::function<std::optional<RawRead>()> take, const std::vector<std::string>& devices)
-      : take_(std::move(take)) {
+  /// @param take  of the capture, of any device
+  SharedReads(TakeRead take, const std::vector<std::string>& devices) : take_(std::move(take)) {
     for (const auto& device : devices) lines_.push_back({device, {}, true});
   }
 
-  /// The next of line `i`, whatever its direction; nothing at the end.
-  std::optional<RawRead> next(std::size_t i) {
+  /// The next of line `i`, whatever its direction, as TakeRead gives it.
+  bool next(std::size_t i, RawRead& read) {
     auto& waiting = lines_[i].waiting;
     while (waiting.empty() && !is_far_ahead()) {
-      auto read = take_();
-      if (!read) return std::nullopt;
-      keep(*read);
+      if (!take_(taken_)) return false;
+      keep(taken_);
     }
-    if (waiting.empty()) return std::nullopt;
-    RawRead read = std::move(waiting.front());
+    if (waiting.empty()) return false;
+    std::swap(taken_, read);  // for its memory
+    read = std::move(waiting.front());
     waiting.pop_front();
     held_ -= read.bytes.size();
-    return read;
+    return true;
   }
   /// So much is kept for others that a line that has nothing waiting goes its own way.
   [[nodiscard]] bool is_far_ahead() const { return held_ > kHeldMost; }
@@ -104,7 +106,8 @@ class SharedReads {
     }
     if (last != nullptr) last->waiting.push_back(std::move(read));
   }
-  std::function<std::optional<RawRead>()> take_;
+  TakeRead take_;
+  RawRead taken_;
   std::vector<Line> lines_;
   std::size_t held_ = 0;
 };
@@ -112,22 +115,21 @@ class SharedReads {
 /// One device's reads out of a capture; what was written to devices is passed over.
 class CaptureSource final : public ByteSource {
  public:
-  /// @param take  the device's next, of any direction
-  CaptureSource(std::function<Result<std::optional<RawRead>>()> take, std::uint64_t total)
-      : take_(std::move(take)), total_(total) {}
+  /// The device's next, of any direction, as TakeRead gives it. May fail.
+  using Take = std::function<Result<bool>(RawRead&)>;
+
+  CaptureSource(Take take, std::uint64_t total) : take_(std::move(take)), total_(total) {}
 
   Result<std::optional<RecordedRead>> next() override {
     for (;;) {
-      auto taken = take_();
+      const auto taken = take_(current_);
       if (!taken) return tl::unexpected<Error>(taken.error());
       if (!*taken) return std::optional<RecordedRead>{};
-      RawRead& read = **taken;
-      if (read.direction == Direction::kLine) {
-        const auto told = line_rate_of(read.bytes);
+      if (current_.direction == Direction::kLine) {
+        const auto told = line_rate_of(current_.bytes);
         if (told) per_byte_ = told;
       }
-      if (read.direction != Direction::kRead) continue;
-      current_ = std::move(read);
+      if (current_.direction != Direction::kRead) continue;
       read_ += current_.bytes.size();
       return std::optional<RecordedRead>{RecordedRead{
           current_.arrival, current_.bytes, std::exchange(per_byte_, std::nullopt), current_.received}};
@@ -137,18 +139,19 @@ class CaptureSource final : public ByteSource {
   [[nodiscard]] std::uint64_t bytes_total() const override { return total_; }
 
  private:
-  std::function<Result<std::optional<RawRead>>()> take_;
+  Take take_;
   std::uint64_t total_;
   std::uint64_t read_ = 0;
   std::optional<Duration> per_byte_;  ///< told, and no read since
   RawRead current_;
 };
 
-std::function<std::optional<RawRead>()> reads_of(CaptureReader reader, Reading reading) {
-  if (reading == Reading::kAhead) {
-    return [ahead = std::make_shared<ReadAhead>(std::move(reader))] { return ahead->next(); };
-  }
-  return [own = std::make_shared<CaptureReader>(std::move(reader))] { return own->next(); };
+TakeRead reads_of(CaptureReader reader, Reading reading) {
+  if (reading == Reading::kAhead)
+    return
+        [ahead = std::make_shared<ReadAhead>(std::move(reader))](RawRead& read) { return ahead->next(read); };
+  return
+      [own = std::make_shared<CaptureReader>(std::move(reader))](RawRead& read) { return own->next(read); };
 }
 
 /// Takes the reads of one device from a reader of its own.
@@ -156,15 +159,15 @@ class OwnReads {
  public:
   OwnReads(CaptureReader reader, std::string device, Reading reading)
       : take_(reads_of(std::move(reader), reading)), device_(std::move(device)) {}
-  Result<std::optional<RawRead>> operator()() {
-    for (;;) {
-      auto read = take_();
-      if (!read || read->device == device_) return read;
+  Result<bool> operator()(RawRead& read) {
+    while (take_(read)) {
+      if (read.device == device_) return true;
     }
+    return false;
   }
 
  private:
-  std::function<std::optional<RawRead>()> take_;
+  TakeRead take_;
   std::string device_;
 };
 
@@ -178,17 +181,19 @@ class SharedLine {
         capture_(std::move(capture)),
         device_(std::move(device)),
         leaves_(nullptr, [all = shared_, index](void*) { all->leave(index); }) {}
-  Result<std::optional<RawRead>> operator()() {
-    if (own_) return (*own_)();
-    auto read = shared_->next(index_);
-    if (read) ++taken_;
-    if (read || !shared_->is_far_ahead()) return read;
+  Result<bool> operator()(RawRead& read) {
+    if (own_) return (*own_)(read);
+    if (shared_->next(index_, read)) {
+      ++taken_;
+      return true;
+    }
+    if (!shared_->is_far_ahead()) return false;
     shared_->leave(index_);
     auto reader = CaptureReader::open(capture_, device_);
     if (!reader) return tl::unexpected<Error>(reader.error());
     own_.emplace(std::move(*reader), device_, Reading::kWhenAsked);
-    for (std::uint64_t i = 0; i < taken_; ++i) (void)(*own_)();
-    return (*own_)();
+    for (std::uint64_t i = 0; i < taken_; ++i) (void)(*own_)(read);
+    return (*own_)(read);
   }
 
  private:

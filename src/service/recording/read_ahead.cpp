@@ -15,34 +15,42 @@ constexpr std::size_t kReadyBlocks = 4;
 }  // namespace
 
 ReadAhead::ReadAhead(CaptureReader reader)
-    : reader_(std::move(reader)), ready_(kReadyBlocks), thread_([this] { read_all(); }) {}
+    : reader_(std::move(reader)),
+      ready_(kReadyBlocks),
+      // With the one that is being read and the one that is being used: nobody waits for room here.
+      used_(kReadyBlocks + 2),
+      thread_([this] { read_all(); }) {}
 
 ReadAhead::~ReadAhead() {
   ready_.refuse();
   thread_.join();
 }
 
-std::optional<RawRead> ReadAhead::next() {
+bool ReadAhead::next(RawRead& read) {
   if (at_ == current_.size()) {
     auto block = ready_.pop();
-    if (!block) return std::nullopt;
+    if (!block) return false;
+    if (!current_.empty()) used_.push(std::move(current_));
     current_ = std::move(*block);
     at_ = 0;
   }
-  return std::move(current_[at_++]);
+  std::swap(read, current_[at_++]);
+  return true;
 }
 
 void ReadAhead::read_all() {
-  Block block;
-  std::size_t bytes = 0;
-  while (auto read = reader_.next()) {
-    bytes += read->bytes.size();
-    block.push_back(std::move(*read));
-    if (block.size() < kBlockReads && bytes < kBlockBytes) continue;
-    if (!ready_.push(std::exchange(block, {}))) return;
-    bytes = 0;
+  for (bool goes_on = true; goes_on;) {
+    Block block = used_.pop_if_ready().value_or(Block{});
+    std::size_t n = 0;
+    for (std::size_t bytes = 0; n < kBlockReads && bytes < kBlockBytes; ++n) {
+      if (n == block.size()) block.emplace_back();
+      goes_on = reader_.next(block[n]);
+      if (!goes_on) break;
+      bytes += block[n].bytes.size();
+    }
+    block.resize(n);
+    if (n > 0 && !ready_.push(std::move(block))) return;
   }
-  if (!block.empty() && !ready_.push(std::move(block))) return;
   ready_.end();
 }
 

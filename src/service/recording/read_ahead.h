@@ -4,7 +4,6 @@
 /// and in which order, is what the reader itself would give. Non-real-time: threads, a lock, allocates.
 
 #include <cstddef>
-#include <optional>
 #include <thread>
 #include <vector>
 
@@ -21,8 +20,9 @@ class ReadAhead {
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
 
-  /// The next read or write; nothing at the end of the capture. Thread: one.
-  [[nodiscard]] std::optional<RawRead> next();
+  /// The next read or write, in the memory of one that is of no use any more; false at the end of the capture.
+  /// Thread: one.
+  [[nodiscard]] bool next(RawRead& read);
 
  private:
   using Block = std::vector<RawRead>;
@@ -30,6 +30,7 @@ class ReadAhead {
 
   CaptureReader reader_;  ///< of the thread alone
   BoundedQueue<Block> ready_;
+  BoundedQueue<Block> used_;  ///< for their memory, the other way
   Block current_;
   std::size_t at_ = 0;
   std::thread thread_;  ///< last, as it uses all of the others

@@ -68,24 +68,25 @@ TEST(ReadAhead, GivesEveryReadOfTheCaptureInItsOrder) {
   ASSERT_TRUE(plain);
   ReadAhead ahead(*CaptureReader::open(path));
   std::size_t n = 0;
+  RawRead read;
   while (const auto expected = plain->next()) {
-    const auto read = ahead.next();
-    ASSERT_TRUE(read) << n;
-    ASSERT_EQ(read->device, expected->device) << n;
-    ASSERT_EQ(read->arrival, expected->arrival) << n;
-    ASSERT_EQ(read->bytes, expected->bytes) << n;
+    ASSERT_TRUE(ahead.next(read)) << n;
+    ASSERT_EQ(read.device, expected->device) << n;
+    ASSERT_EQ(read.arrival, expected->arrival) << n;
+    ASSERT_EQ(read.bytes, expected->bytes) << n;
     ++n;
   }
   EXPECT_EQ(n, 30'000U + 60U + 50U);
-  EXPECT_FALSE(ahead.next());
-  EXPECT_FALSE(ahead.next()) << "the end stays the end";
+  EXPECT_FALSE(ahead.next(read));
+  EXPECT_FALSE(ahead.next(read)) << "the end stays the end";
 }
 
 TEST(ReadAhead, EndsWhereverItIsLeft) {
   const auto path = capture();
   for (const int taken : {0, 1, 1500}) {
     ReadAhead ahead(*CaptureReader::open(path));
-    for (int i = 0; i < taken; ++i) ASSERT_TRUE(ahead.next());
+    RawRead read;
+    for (int i = 0; i < taken; ++i) ASSERT_TRUE(ahead.next(read));
   }
 }
 
