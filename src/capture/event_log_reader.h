@@ -34,7 +34,7 @@ class EventLogReader {
   /// Is told, now and then, how many bytes of the file have been read.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { on_read_ = std::move(listener); }
 
-  /// Events whose data nobody wants: passed over without a copy, but next to damage, where they are given.
+  /// Events whose data nobody wants: passed over without a copy, except next to damage, where they are given.
   using Unwanted = std::function<bool(std::span<const std::uint8_t> data)>;
   void pass_over(Unwanted unwanted) { unwanted_ = std::move(unwanted); }
 

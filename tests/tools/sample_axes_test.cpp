@@ -60,8 +60,9 @@ TEST(AxesSink, OnTheDiskSaysWhatInMemoryIsSaid) {
     ASSERT_TRUE(on_disk) << on_disk.error().text();
     // Short ones are in memory either way.
     const bool is_on_disk = static_cast<bool>(on_disk->fetches[0]);
-    ASSERT_EQ(in_memory->temperature_c != nullptr,
-              is_on_disk ? static_cast<bool>(on_disk->read_tempered[0]) : on_disk->temperature_c != nullptr);
+    ASSERT_EQ(in_memory->temperature_c != nullptr, is_on_disk
+                                                       ? static_cast<bool>(on_disk->read_with_temperature[0])
+                                                       : on_disk->temperature_c != nullptr);
     for (std::size_t axis = 0; axis < kMessageAxes.size(); ++axis) {
       const Signal& signal = in_memory->axes[axis];
       if (!on_disk->fetches[axis]) continue;  // short enough
@@ -76,23 +77,24 @@ TEST(AxesSink, OnTheDiskSaysWhatInMemoryIsSaid) {
         }
       }
     }
-    if (!on_disk->read_tempered[0]) continue;
+    if (!on_disk->read_with_temperature[0]) continue;
     for (std::size_t axis = 0; axis < kMessageAxes.size(); ++axis) {
       const Signal& signal = in_memory->axes[axis];
       std::size_t i = 0;
-      const auto done = on_disk->read_tempered[axis]([&](const certificate::TemperedPiece& piece) {
-        ASSERT_EQ(piece.temperature_c.size(), piece.x.size());
-        for (std::size_t k = 0; k < piece.x.size(); ++k, ++i) {
-          ASSERT_LT(i, signal.values.size());
-          const float a = piece.temperature_c[k];
-          const float b = (*in_memory->temperature_c)[i];
-          ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i;
-          ASSERT_EQ(std::isnan(piece.x[k]), signal.mask[i] == 0) << i;
-          if (signal.mask[i] != 0) {
-            ASSERT_EQ(piece.x[k], signal.values[i]) << i;
-          }
-        }
-      });
+      const auto done =
+          on_disk->read_with_temperature[axis]([&](const certificate::PieceWithTemperature& piece) {
+            ASSERT_EQ(piece.temperature_c.size(), piece.x.size());
+            for (std::size_t k = 0; k < piece.x.size(); ++k, ++i) {
+              ASSERT_LT(i, signal.values.size());
+              const float a = piece.temperature_c[k];
+              const float b = (*in_memory->temperature_c)[i];
+              ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i;
+              ASSERT_EQ(std::isnan(piece.x[k]), signal.mask[i] == 0) << i;
+              if (signal.mask[i] != 0) {
+                ASSERT_EQ(piece.x[k], signal.values[i]) << i;
+              }
+            }
+          });
       ASSERT_TRUE(done);
       EXPECT_EQ(i, signal.values.size());
     }

@@ -60,7 +60,7 @@ SensorRecord record_of(const std::filesystem::path& file, const std::string& dev
     axis.mask = std::move(signal.mask);
     axis.fetch = std::move(read.fetches[i]);
     axis.temperature_c = read.temperature_c;
-    axis.read_tempered = std::move(read.read_tempered[i]);
+    axis.read_with_temperature = std::move(read.read_with_temperature[i]);
     sensor.axes.push_back(std::move(axis));
   }
   return sensor;

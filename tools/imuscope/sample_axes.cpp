@@ -68,11 +68,11 @@ Result<std::vector<Value>> filled(const RowPlaces& places, Read&& read) {
 }
 
 /// An axis with its temperatures, piece by piece, and NaN where samples are missing.
-class Tempered {
+class AxisWithTemperature {
  public:
-  using Take = std::function<void(const certificate::TemperedPiece&)>;
+  using Take = std::function<void(const certificate::PieceWithTemperature&)>;
 
-  Tempered(const RowPlaces& places, const Spool& axis, const Spool& temperature, const Take& take)
+  AxisWithTemperature(const RowPlaces& places, const Spool& axis, const Spool& temperature, const Take& take)
       : places_(places), axis_(axis), temperature_(temperature), take_(take) {}
 
   Result<void> read() {
@@ -246,8 +246,8 @@ Result<SampleAxes> AxesSink::axes_on_disk(std::optional<double> rate_hz) {
           *places, [&](std::size_t first, std::span<double> values) { return spool->read(first, values); });
     };
     if (!has_temperature) continue;
-    out.read_tempered[axis] = [places, spool, temperature](const Tempered::Take& take) {
-      return Tempered(*places, *spool, *temperature, take).read();
+    out.read_with_temperature[axis] = [places, spool, temperature](const AxisWithTemperature::Take& take) {
+      return AxisWithTemperature(*places, *spool, *temperature, take).read();
     };
   }
   return out;

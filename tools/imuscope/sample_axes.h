@@ -29,7 +29,7 @@ struct SampleAxes {
   /// One a sample, the last that was sent; null: none.
   std::shared_ptr<const std::vector<float>> temperature_c{};
   /// In its place, of samples that lie on the disk: with those of an axis.
-  std::array<certificate::ReadTempered, kMessageAxes.size()> read_tempered;
+  std::array<certificate::ReadWithTemperature, kMessageAxes.size()> read_with_temperature;
 };
 
 /// Takes an IMU's samples, in order, and keeps what the axes need of them.

@@ -296,14 +296,14 @@ Result<AxisCertificate> modelled(Reduced&& axis, const AxisRecord& record, const
 
 /// What only the samples and the model together tell.
 Result<AxisCertificate> with_temperature(Result<AxisCertificate>&& axis, const AxisRecord& record) {
-  if (!axis || (record.temperature_c == nullptr && !record.read_tempered)) return std::move(axis);
-  if (!record.read_tempered) {
+  if (!axis || (record.temperature_c == nullptr && !record.read_with_temperature)) return std::move(axis);
+  if (!record.read_with_temperature) {
     const auto x = samples_of(record);
     if (!x) return tl::unexpected(named(record, x.error()));
     axis->temperature = temperature_of(*x, record.mask, *record.temperature_c, axis->fit);
     return std::move(axis);
   }
-  auto temperature = temperature_of(record.read_tempered, axis->fit);
+  auto temperature = temperature_of(record.read_with_temperature, axis->fit);
   if (!temperature) return tl::unexpected(named(record, temperature.error()));
   axis->temperature = *temperature;
   return std::move(axis);

@@ -39,7 +39,7 @@ struct AxisRecord {
   /// In place of `values`, of a record that is too long to lie in memory as a whole.
   FetchSamples fetch{};
   /// In place of `temperature_c`, of such a record: samples and temperatures.
-  ReadTempered read_tempered{};
+  ReadWithTemperature read_with_temperature{};
 };
 
 /// Do the two halves of the record come from one model?

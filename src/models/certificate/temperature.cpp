@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kWindows = 40;
 constexpr std::size_t kLeastWindow = 500;
 
-bool is_there(const TemperedPiece& piece, std::size_t i) {
+bool is_there(const PieceWithTemperature& piece, std::size_t i) {
   return (piece.mask.empty() || piece.mask[i] != 0) && std::isfinite(piece.x[i]) &&
          std::isfinite(piece.temperature_c[i]);
 }
@@ -28,7 +28,7 @@ struct Range {
   std::size_t n = 0;        ///< samples that are there
   std::size_t samples = 0;  ///< all
 
-  void add(const TemperedPiece& piece) {
+  void add(const PieceWithTemperature& piece) {
     for (std::size_t i = 0; i < piece.x.size(); ++i) {
       if (!is_there(piece, i)) continue;
       const auto now = static_cast<double>(piece.temperature_c[i]);
@@ -78,7 +78,7 @@ class BiasSlope {
  public:
   BiasSlope(const noise::Model& model, double mean_c) : whitener_(model, kColumns), mean_c_(mean_c) {}
 
-  void add(const TemperedPiece& piece) {
+  void add(const PieceWithTemperature& piece) {
     for (std::size_t i = 0; i < piece.x.size(); ++i) {
       if (!is_there(piece, i)) {
         whitener_.skip();
@@ -117,7 +117,7 @@ class NoiseSlope {
  public:
   explicit NoiseSlope(std::size_t samples) : length_(samples / kWindows) {}
 
-  void add(const TemperedPiece& piece) {
+  void add(const PieceWithTemperature& piece) {
     if (length_ < kLeastWindow) return;
     for (std::size_t i = 0; i < piece.x.size(); ++i) {
       const std::optional<double> now = is_there(piece, i) ? std::optional(piece.x[i]) : std::nullopt;
@@ -160,9 +160,10 @@ class NoiseSlope {
 
 }  // namespace
 
-Result<std::optional<Temperature>> temperature_of(const ReadTempered& read, const noise::FitResult& fit) {
+Result<std::optional<Temperature>> temperature_of(const ReadWithTemperature& read,
+                                                  const noise::FitResult& fit) {
   Range range;
-  if (auto done = read([&](const TemperedPiece& piece) { range.add(piece); }); !done)
+  if (auto done = read([&](const PieceWithTemperature& piece) { range.add(piece); }); !done)
     return tl::unexpected(done.error());
   if (range.n == 0 || range.highest - range.lowest < kLeastRange_c) return std::nullopt;
   const auto& terms = fit.model.components;
@@ -173,7 +174,7 @@ Result<std::optional<Temperature>> temperature_of(const ReadTempered& read, cons
   out.highest_c = range.highest;
   BiasSlope bias(fit.model, out.mean_c);
   NoiseSlope noise(range.samples);
-  const auto take = [&](const TemperedPiece& piece) {
+  const auto take = [&](const PieceWithTemperature& piece) {
     bias.add(piece);
     noise.add(piece);
   };
@@ -186,8 +187,8 @@ Result<std::optional<Temperature>> temperature_of(const ReadTempered& read, cons
 std::optional<Temperature> temperature_of(std::span<const double> x, std::span<const std::uint8_t> mask,
                                           std::span<const float> temperature_c, const noise::FitResult& fit) {
   if (temperature_c.size() != x.size()) return std::nullopt;
-  const TemperedPiece all{x, mask, temperature_c};
-  const auto read = [&all](const std::function<void(const TemperedPiece&)>& take) -> Result<void> {
+  const PieceWithTemperature all{x, mask, temperature_c};
+  const auto read = [&all](const std::function<void(const PieceWithTemperature&)>& take) -> Result<void> {
     take(all);
     return {};
   };

@@ -26,17 +26,19 @@ struct Temperature {
 };
 
 /// A stretch of an axis with its temperatures, one a sample.
-struct TemperedPiece {
+struct PieceWithTemperature {
   std::span<const double> x;
   std::span<const std::uint8_t> mask;  ///< empty: all are there; NaN and infinity count as missing
   std::span<const float> temperature_c;
 };
 
 /// Hands on the pieces of a record one after the other. Asked twice.
-using ReadTempered = std::function<Result<void>(const std::function<void(const TemperedPiece&)>& take)>;
+using ReadWithTemperature =
+    std::function<Result<void>(const std::function<void(const PieceWithTemperature&)>& take)>;
 
 /// Of a record that is read piece by piece. Errors: those of `read`.
-Result<std::optional<Temperature>> temperature_of(const ReadTempered& read, const noise::FitResult& fit);
+Result<std::optional<Temperature>> temperature_of(const ReadWithTemperature& read,
+                                                  const noise::FitResult& fit);
 
 /// Absent where the temperature is missing, or does not vary by kLeastRange_c, and where no term of the fit has an
 /// amplitude.

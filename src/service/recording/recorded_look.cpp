@@ -1,55 +1,36 @@
 #include "service/recording/recorded_look.h"
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "check/check.h"
 #include "service/pipeline/device_factory.h"
 #include "service/recording/decoded_lines.h"
+#include "service/recording/decoded_reads.h"
 #include "service/recording/side_by_side.h"
 
 namespace imuscope {
 
 namespace {
 
-/// The first sample that has a UTC tag.
-class UtcFinder final : public SampleSink {
- public:
-  void on_sample(const Sample& sample) noexcept override {
-    if (!difference_ && sample.has_utc) difference_ = Duration{to_ns(sample.utc) - to_ns(sample.time)};
-  }
-  [[nodiscard]] std::optional<Duration> difference() const { return difference_; }
-
- private:
-  std::optional<Duration> difference_;
-};
-
-/// Decodes a device until `enough` says so, or the end.
-template <typename Enough>
-void decode(const Configuration& configuration, const Recording& recording, std::size_t device,
-            SampleSink& sink, Enough enough) {
-  const auto index = static_cast<DeviceIndex>(device);
-  auto source = recording.open(index);
-  if (!source) return;
-  const auto decoder = make_decoder(configuration.devices[device], index, recording.clocks[device].map);
-  while (!enough()) {
-    const auto read = (*source)->next();
-    if (!read) return;
-    if (!*read) break;
-    decoder->push((*read)->bytes, (*read)->arrival.value_or(HostTime{}), sink);
-  }
-  decoder->finish(HostTime{}, sink);
-}
-
 /// UTC minus the device's own time; a tag stands in the first minutes or nowhere.
 std::optional<Duration> utc_of(const Configuration& configuration, const Recording& recording,
                                std::size_t device) {
   constexpr int kReadsMax = 4096;
-  UtcFinder finder;
-  int reads = 0;
-  decode(configuration, recording, device, finder,
-         [&] { return finder.difference() || reads++ == kReadsMax; });
-  return finder.difference();
+  const auto index = static_cast<DeviceIndex>(device);
+  auto source = recording.open(index);
+  if (!source) return std::nullopt;
+  DecodedReads reads(std::move(*source),
+                     make_decoder(configuration.devices[device], index, recording.clocks[device].map), false);
+  for (int n = 0; n < kReadsMax; ++n) {
+    const auto read = reads.next();
+    if (!read || !*read) return std::nullopt;
+    for (const Sample& sample : (*read)->samples) {
+      if (sample.has_utc) return Duration{to_ns(sample.utc) - to_ns(sample.time)};
+    }
+  }
+  return std::nullopt;
 }
 
 /// All devices into the drive. The first device that has a sample has the first one: seconds of the drive count from

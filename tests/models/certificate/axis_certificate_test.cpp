@@ -203,7 +203,8 @@ TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
   AxisRecord fetched = record;
   fetched.values.clear();
   fetched.fetch = [values = record.values]() -> Result<std::vector<double>> { return values; };
-  fetched.read_tempered = [x = record.values, t = record.temperature_c](const auto& take) -> Result<void> {
+  fetched.read_with_temperature = [x = record.values,
+                                   t = record.temperature_c](const auto& take) -> Result<void> {
     for (std::size_t at = 0; at < x.size(); at += 777) {
       const std::size_t n = std::min<std::size_t>(777, x.size() - at);
       take({std::span(x).subspan(at, n), {}, std::span(*t).subspan(at, n)});
@@ -223,7 +224,7 @@ TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
 
 TEST(AxisCertificate, TemperaturesThatCannotBeFetchedAreTold) {
   AxisRecord record = made_gyro(40'000, 8);
-  record.read_tempered = [](const auto&) -> Result<void> { return work_error("the disk is gone"); };
+  record.read_with_temperature = [](const auto&) -> Result<void> { return work_error("the disk is gone"); };
   const auto axis = characterize_axis(record, {});
   ASSERT_FALSE(axis);
   EXPECT_THAT(axis.error().text(), testing::HasSubstr("the disk is gone"));
