@@ -21,7 +21,7 @@ constexpr double kBreakMax_s = 24.0 * 3600.0;
 
 /// When the first read came, by the recorder's clock, from this record on. A header and what was published do not
 /// tell: the one has the time of the run's beginning, the others that of GNSS.
-std::optional<std::int64_t> first_read_from(LogEvent& event, SealedLog& log) {
+std::optional<std::int64_t> first_read_from(LogEventView& event, SealedLog& log) {
   // Minutes in which no device sends hold fewer.
   constexpr int kRecordsMost = 10000;
   for (int i = 0; i < kRecordsMost; ++i) {
@@ -31,7 +31,7 @@ std::optional<std::int64_t> first_read_from(LogEvent& event, SealedLog& log) {
   return std::nullopt;
 }
 
-std::optional<HostTime> t0_of(const LogEvent& event) {
+std::optional<HostTime> t0_of(const LogEventView& event) {
   const auto record = decode_record(event.data);
   if (!record) return std::nullopt;
   const auto* run = std::get_if<RunHeader>(&*record);
@@ -72,7 +72,7 @@ void CaptureFiles::report_reads() {
   });
 }
 
-void CaptureFiles::pass_over(const EventLogReader::Unwanted& unwanted) {
+void CaptureFiles::pass_over(const SealedLog::Unwanted& unwanted) {
   unwanted_ = unwanted;
   log_.pass_over(unwanted_);
 }
@@ -83,7 +83,7 @@ void CaptureFiles::begin_file(SealedLog log, int number) {
   number_ = number;
 }
 
-bool CaptureFiles::next(LogEvent& event) {
+bool CaptureFiles::next(LogEventView& event) {
   while (!log_.next(event)) {
     if (!open_following()) return false;
   }
@@ -125,7 +125,7 @@ std::optional<HostTime> CaptureFiles::t0_of_others() const {
     std::error_code ignored;
     if (!std::filesystem::exists(path, ignored)) continue;
     auto log = EventLogReader::open(path);
-    LogEvent event;
+    LogEventView event;
     if (log && log->next(event)) return t0_of(event);
   }
   return std::nullopt;
@@ -138,7 +138,7 @@ std::optional<CaptureBreak> CaptureFiles::joins(int number) const {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return std::nullopt;
   auto log = SealedLog::open(path, EventLogReader::Beginning::kMayBeDamaged);
-  LogEvent event;
+  LogEventView event;
   if (!log || !log->next(event)) return std::nullopt;
   const auto t0 = t0_of(event);
   if (t0 && t0 != t0_) return std::nullopt;

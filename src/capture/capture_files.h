@@ -49,10 +49,12 @@ class CaptureFiles {
   void on_read(const std::function<void(double share)>& listener);
 
   /// See SealedLog: what files() says then is of no use.
-  void pass_over(const EventLogReader::Unwanted& unwanted);
+  void pass_over(const SealedLog::Unwanted& unwanted);
 
-  /// Fetches the next event. Returns false at the end of the last file.
-  [[nodiscard]] bool next(LogEvent& event);
+  /// Fetches the next event, which stays where it is until the next call. Returns false at the end of the last file.
+  [[nodiscard]] bool next(LogEventView& event);
+  /// The same as a copy.
+  [[nodiscard]] bool next(LogEvent& event) { return copy_next(*this, event); }
 
   /// Somewhere in a capture that is read again from there.
   struct Place {
@@ -81,7 +83,7 @@ class CaptureFiles {
 
   std::filesystem::path first_;
   std::function<void(double)> on_read_;
-  EventLogReader::Unwanted unwanted_;
+  SealedLog::Unwanted unwanted_;
   int number_ = 0;
   SealedLog log_;
   bool at_beginning_ = true;

@@ -92,7 +92,7 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
   log->on_read(progress);
   CaptureSummary summary;
   DeviceCounts counts;
-  LogEvent event;
+  LogEventView event;
   while (log->next(event)) {
     if (const auto piece = view_raw(event.data)) {
       if (!counts.add(*piece, summary.losses)) summary.other_messages += 1;
@@ -131,7 +131,7 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
 
 std::optional<RunHeader> run_header_of(const std::filesystem::path& path) {
   auto log = CaptureFiles::open(path);
-  LogEvent event;
+  LogEventView event;
   if (!log || !log->next(event)) return std::nullopt;
   auto record = decode_record(event.data);
   auto* run = record ? std::get_if<RunHeader>(&*record) : nullptr;
@@ -192,12 +192,13 @@ RawRead CaptureReader::read_of(const RawView& piece) {
 
 /// Takes in one event. Returns false at the end of the file.
 bool CaptureReader::read_one() {
-  if (!log_.next(event_)) return false;
-  if (const auto piece = view_raw(event_.data)) {
+  LogEventView event;
+  if (!log_.next(event)) return false;
+  if (const auto piece = view_raw(event.data)) {
     if (wanted_.empty() || piece->device == wanted_) add_piece(*piece);
     return true;
   }
-  const auto record = decode_record(event_.data);
+  const auto record = decode_record(event.data);
   if (!record) return true;
   if (const auto* run = std::get_if<RunHeader>(&*record)) devices_ = run->devices;
   return true;

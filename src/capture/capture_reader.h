@@ -130,8 +130,7 @@ class CaptureReader {
     RawRead read;
   };
   std::deque<Held> held_;        ///< rising; nearly all that comes belongs to its end
-  LogEvent event_;               ///< kept for its memory
-  std::vector<RawRead> spares_;  ///< likewise
+  std::vector<RawRead> spares_;  ///< kept for their memory
   std::size_t held_bytes_ = 0;
   std::uint64_t completed_ = 0;
   HostTime newest_ = HostTime::min();

@@ -52,7 +52,7 @@ class Copy {
  public:
   Copy(const CaptureCheck& checked, std::filesystem::path out) : checked_(checked), out_(std::move(out)) {}
 
-  Result<void> add(int number, const LogEvent& event) {
+  Result<void> add(int number, const LogEventView& event) {
     // A seal that does not stand where it was put was read as any record. In the copy it might stand so
     // again, and the copy has seals of its own.
     if (decode_seal(event.data) || decode_index(event.data)) return {};
@@ -71,13 +71,13 @@ class Copy {
   }
 
  private:
-  static std::optional<std::string> channel_of_header(const LogEvent& event) {
+  static std::optional<std::string> channel_of_header(const LogEventView& event) {
     const auto record = decode_record(event.data);
     if (!record || !std::holds_alternative<RunHeader>(*record)) return std::nullopt;
-    return event.channel;
+    return std::string(event.channel);
   }
 
-  Result<void> begin(int number, const LogEvent& event, bool is_header) {
+  Result<void> begin(int number, const LogEventView& event, bool is_header) {
     if (auto closed = close(); !closed) return closed;
     if (is_header && event.channel.ends_with(kRunSuffix))
       prefix_ = event.channel.substr(0, event.channel.size() - kRunSuffix.size());
@@ -132,7 +132,7 @@ Result<Repaired> repair_capture(const std::filesystem::path& first, const Captur
   auto log = CaptureFiles::open(first, EventLogReader::Beginning::kMayBeDamaged);
   if (!log) return tl::unexpected<Error>(log.error());
   Copy copy(checked, out);
-  LogEvent event;
+  LogEventView event;
   while (log->next(event)) {
     if (auto added = copy.add(log->number(), event); !added) return tl::unexpected<Error>(added.error());
   }

@@ -16,6 +16,13 @@ std::uint8_t* put_big_endian(std::uint8_t* at, Integer value) noexcept {
 
 }  // namespace
 
+void LogEventView::copy_to(LogEvent& event) const {
+  event.number = number;
+  event.utime = utime;
+  event.channel.assign(channel);
+  event.data.assign(data.begin(), data.end());
+}
+
 EventLogHeader event_log_header(std::int64_t number, std::int64_t utime, std::size_t channel_bytes,
                                 std::size_t data_bytes) noexcept {
   EventLogHeader header{};

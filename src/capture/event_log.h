@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,28 @@ struct LogEvent {
   std::string channel;
   std::vector<std::uint8_t> data;
 };
+
+/// The same in somebody else's memory, which says how long it stays there.
+struct LogEventView {
+  std::int64_t number = 0;
+  std::int64_t utime = 0;
+  std::string_view channel;
+  std::span<const std::uint8_t> data;
+
+  LogEventView() = default;
+  LogEventView(const LogEvent& event)  // NOLINT(google-explicit-constructor): as a string is a string_view
+      : number(event.number), utime(event.utime), channel(event.channel), data(event.data) {}
+  void copy_to(LogEvent& event) const;
+};
+
+/// The next event of a reader that gives views, as a copy; false at the end.
+template <typename Reader>
+[[nodiscard]] bool copy_next(Reader& reader, LogEvent& event) {
+  LogEventView view;
+  if (!reader.next(view)) return false;
+  view.copy_to(event);
+  return true;
+}
 
 /// What a record begins with, up to its channel.
 using EventLogHeader = std::array<std::uint8_t, kEventLogHeaderBytes>;

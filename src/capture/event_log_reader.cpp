@@ -47,8 +47,16 @@ constexpr std::array<std::uint8_t, sizeof kEventLogSync> kSyncWord{
     kEventLogSync >> 24U & 0xFFU, kEventLogSync >> 16U & 0xFFU, kEventLogSync >> 8U & 0xFFU,
     kEventLogSync & 0xFFU};
 
-std::span<const std::uint8_t> data_of(std::span<const std::uint8_t> record) {
-  return record.last(lengths_of(record.data()).data);
+/// A whole record, by its header.
+LogEventView view_of(const std::uint8_t* record) noexcept {
+  const Lengths lengths = lengths_of(record);
+  LogEventView event;
+  event.number = number_at<std::int64_t>(record + kNumberAt);
+  event.utime = number_at<std::int64_t>(record + kUtimeAt);
+  const std::uint8_t* channel = record + kEventLogHeaderBytes;
+  event.channel = {reinterpret_cast<const char*>(channel), lengths.channel};
+  event.data = {channel + lengths.channel, lengths.data};
+  return event;
 }
 
 bool is_sync(const std::uint8_t* bytes) { return number_at<std::uint32_t>(bytes) == kEventLogSync; }
@@ -113,16 +121,14 @@ Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path, B
 
   EventLogReader reader(std::move(file));
   (void)reader.ensure(kSniffBytes);
-  if (reader.buffer_.empty()) {
+  if (reader.available() == 0) {
     return work_error(name + " is empty: nothing was recorded",
                       "check that recording ran and the disk had space");
   }
   constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
-  const bool has_sync = reader.buffer_.size() >= kSyncBytes && is_sync(reader.buffer_.data());
+  const bool has_sync = reader.available() >= kSyncBytes && is_sync(reader.at(0));
   if (!has_sync && beginning == Beginning::kIsARecord) {
-    const std::vector<std::uint8_t> first(
-        reader.buffer_.begin(),
-        reader.buffer_.begin() + static_cast<std::ptrdiff_t>(std::min(reader.buffer_.size(), kSniffBytes)));
+    const std::vector<std::uint8_t> first(reader.at(0), reader.at(std::min(reader.available(), kSniffBytes)));
     return usage_error(
         name + " is not a capture (an LCM event log) but " + describe_bytes(first),
         "give a raw device dump as NAME=" + name + ", with the device's name in the configuration");
@@ -131,27 +137,32 @@ Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path, B
 }
 
 bool EventLogReader::ensure(std::size_t n) {
-  if (buffer_.size() - begin_ >= n) return true;
+  if (available() >= n) return true;
   if (!file_) return false;
-  // Moving what is left costs as much as it is long: where a quarter of it was consumed, every byte is moved
-  // four times at most, and little is held that is of no use any more.
-  if (kMovesPerByte * begin_ >= buffer_.size() - begin_) {
-    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin_));
-    begin_ = 0;
-  }
   // A long record at its length, not at the next power of two; memory that is never filled costs nothing.
-  if (n > buffer_.size() - begin_ + kReadBytes) buffer_.reserve(begin_ + n + kReadBytes);
-  // By blocks: a record may claim a length that the file does not have.
-  while (buffer_.size() - begin_ < n && file_) {
-    const std::size_t have = buffer_.size();
-    buffer_.resize(have + kReadBytes);
-    file_.read(reinterpret_cast<char*>(buffer_.data() + have),
-               static_cast<std::streamsize>(buffer_.size() - have));
-    buffer_.resize(have + static_cast<std::size_t>(file_.gcount()));
-    read_ += buffer_.size() - have;
-    if (on_read_) on_read_(read_);
+  if (n > available() + kReadBytes) buffer_.reserve(begin_ + n + kReadBytes);
+  while (available() < n && file_) read_block();
+  return available() >= n;
+}
+
+/// By blocks: a record may claim a length that the file does not have.
+void EventLogReader::read_block() {
+  // What nobody needs any more goes to make room. Moving what is left costs as much as it is long: where a quarter of it
+  // was consumed, every byte is moved four times at most.
+  const std::uint64_t first = read_ - end_;  // place of the buffer's first byte
+  const std::size_t spent = kept_ < place() ? static_cast<std::size_t>(kept_ - first) : begin_;
+  if (buffer_.size() - end_ < kReadBytes && kMovesPerByte * spent >= end_ - spent) {
+    std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(spent),
+              buffer_.begin() + static_cast<std::ptrdiff_t>(end_), buffer_.begin());
+    begin_ -= spent;
+    end_ -= spent;
   }
-  return buffer_.size() - begin_ >= n;
+  if (buffer_.size() - end_ < kReadBytes) buffer_.resize(end_ + kReadBytes);
+  file_.read(reinterpret_cast<char*>(buffer_.data() + end_), static_cast<std::streamsize>(kReadBytes));
+  const auto n = static_cast<std::size_t>(file_.gcount());
+  end_ += n;
+  read_ += n;
+  if (on_read_) on_read_(read_);
 }
 
 /// The record that begins `position` bytes after the last one consumed, by its header alone.
@@ -159,7 +170,7 @@ EventLogReader::Look EventLogReader::look_at(std::size_t position, std::size_t& 
   const bool header_is_here = ensure(position + kEventLogHeaderBytes);
   if (!may_begin_record(position)) return Look::kNoRecord;
   if (!header_is_here) return Look::kCutOff;
-  const Lengths lengths = lengths_of(buffer_.data() + begin_ + position);
+  const Lengths lengths = lengths_of(at(position));
   if (!lengths.plausible()) return Look::kNoRecord;
   length = lengths.record();
   return ensure(position + length) ? Look::kRecord : Look::kCutOff;
@@ -169,18 +180,16 @@ EventLogReader::Look EventLogReader::look_at(std::size_t position, std::size_t& 
 bool EventLogReader::may_begin_record(std::size_t position) {
   constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
   (void)ensure(position + kSyncBytes);
-  const std::size_t available = std::min(buffer_.size() - begin_ - position, kSyncBytes);
-  const std::uint8_t* at = buffer_.data() + begin_ + position;
-  return std::equal(at, at + available, kSyncWord.begin());
+  const std::size_t here = std::min(available() - position, kSyncBytes);
+  return std::equal(at(position), at(position) + here, kSyncWord.begin());
 }
 
 /// Where a sync word may begin at the earliest, `position` or later: what lies before it in the buffer is
 /// none.
 std::size_t EventLogReader::next_sync(std::size_t position) {
   constexpr auto kFirst = static_cast<std::uint8_t>(kEventLogSync >> 24U);
-  const auto from =
-      buffer_.begin() + static_cast<std::ptrdiff_t>(std::min(begin_ + position, buffer_.size()));
-  return static_cast<std::size_t>(std::find(from, buffer_.end(), kFirst) - buffer_.begin()) - begin_;
+  const std::uint8_t* const end = at(available());
+  return static_cast<std::size_t>(std::find(at(std::min(position, available())), end, kFirst) - at(0));
 }
 
 /// Where the first record begins after `position` and before `limit` that another record, or the end of the
@@ -196,24 +205,19 @@ std::optional<std::size_t> EventLogReader::next_sure_record(std::size_t position
 }
 
 /// There nearly always is one.
-std::size_t EventLogReader::sure_record() const noexcept {
+bool EventLogReader::is_sure_record() const noexcept {
   constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
-  const std::size_t available = buffer_.size() - begin_;
-  const std::uint8_t* at = buffer_.data() + begin_;
-  if (available < kEventLogHeaderBytes || !is_sync(at)) return 0;
-  const Lengths lengths = lengths_of(at);
-  if (!lengths.plausible()) return 0;
+  if (available() < kEventLogHeaderBytes || !is_sync(at(0))) return false;
+  const Lengths lengths = lengths_of(at(0));
+  if (!lengths.plausible()) return false;
   const std::size_t length = lengths.record();
-  return length + kSyncBytes <= available && is_sync(at + length) ? length : 0;
+  return length + kSyncBytes <= available() && is_sync(at(length));
 }
 
-bool EventLogReader::next(LogEvent& event) {
-  while (const std::size_t length = sure_record()) {
-    if (!unwanted_ || !unwanted_(data_of({buffer_.data() + begin_, length}))) {
-      take(event);
-      return true;
-    }
-    begin_ += length;
+bool EventLogReader::next(LogEventView& event) {
+  if (is_sure_record()) {
+    take(event);
+    return true;
   }
   while (ensure(1)) {
     std::size_t skip = 1;
@@ -228,10 +232,10 @@ bool EventLogReader::next(LogEvent& event) {
       }
       skip = *inside;
     } else if (look == Look::kCutOff) {
-      const auto behind = next_sure_record(0, buffer_.size() - begin_);
+      const auto behind = next_sure_record(0, available());
       if (!behind) {
-        bytes_cut_off_ = buffer_.size() - begin_;
-        begin_ = buffer_.size();
+        bytes_cut_off_ = available();
+        begin_ = end_;
         return false;
       }
       skip = *behind;
@@ -244,23 +248,22 @@ bool EventLogReader::next(LogEvent& event) {
 }
 
 void EventLogReader::go_to(std::uint64_t place) {
-  buffer_.clear();
   begin_ = 0;
+  end_ = 0;
+  kept_ = kNothingKept;
   read_ = place;
   file_.clear();
   file_.seekg(static_cast<std::streamoff>(place));
 }
 
-void EventLogReader::take(LogEvent& event) {
-  const std::uint8_t* record = buffer_.data() + begin_;
-  const Lengths lengths = lengths_of(record);
-  event.number = number_at<std::int64_t>(record + kNumberAt);
-  event.utime = number_at<std::int64_t>(record + kUtimeAt);
-  const std::uint8_t* channel = record + kEventLogHeaderBytes;
-  const std::uint8_t* data = channel + lengths.channel;
-  event.channel.assign(channel, data);
-  event.data.assign(data, data + lengths.data);
-  begin_ += lengths.record();
+LogEventView EventLogReader::event_at(std::uint64_t place) const noexcept {
+  return view_of(buffer_.data() + (place - (read_ - end_)));
+}
+
+void EventLogReader::take(LogEventView& event) {
+  given_ = place();
+  event = view_of(at(0));
+  begin_ += lengths_of(at(0)).record();
 }
 
 }  // namespace imuscope

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <optional>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,16 +34,21 @@ class EventLogReader {
   /// Is told, now and then, how many bytes of the file have been read.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { on_read_ = std::move(listener); }
 
-  /// Events whose data nobody wants: passed over without a copy, except next to damage, where they are given.
-  using Unwanted = std::function<bool(std::span<const std::uint8_t> data)>;
-  void pass_over(Unwanted unwanted) { unwanted_ = std::move(unwanted); }
-
-  /// Fetches the next event. Returns false at the end of the file.
-  [[nodiscard]] bool next(LogEvent& event);
+  /// Fetches the next event, which stays where it is until the next call. Returns false at the end of the file.
+  [[nodiscard]] bool next(LogEventView& event);
+  /// The same as a copy.
+  [[nodiscard]] bool next(LogEvent& event) { return copy_next(*this, event); }
 
   /// Bytes of the file before the next event; go_to() goes on from such a place.
-  [[nodiscard]] std::uint64_t place() const noexcept { return read_ - (buffer_.size() - begin_); }
+  [[nodiscard]] std::uint64_t place() const noexcept { return read_ - (end_ - begin_); }
+  /// Bytes of the file before the event that was given last.
+  [[nodiscard]] std::uint64_t given_place() const noexcept { return given_; }
   void go_to(std::uint64_t place);
+
+  /// What was read is kept from here on, until another place is told. Precondition: not before the one told last.
+  void keep_from(std::uint64_t place) noexcept { kept_ = place; }
+  /// An event that was given, and is kept; stays where it is until the next call of next().
+  [[nodiscard]] LogEventView event_at(std::uint64_t place) const noexcept;
 
   /// Bytes in the midst of the file that belong to no whole record.
   [[nodiscard]] std::uint64_t bytes_skipped() const noexcept { return bytes_skipped_; }
@@ -52,24 +57,34 @@ class EventLogReader {
   [[nodiscard]] std::uint64_t bytes_cut_off() const noexcept { return bytes_cut_off_; }
 
  private:
+  static constexpr std::uint64_t kNothingKept = std::numeric_limits<std::uint64_t>::max();
   enum class Look : std::uint8_t { kRecord, kNoRecord, kCutOff };
 
   explicit EventLogReader(std::ifstream file) : file_(std::move(file)) {}
-  /// Bytes of the record that lies whole in the buffer and that another one follows; 0 where there is none.
-  [[nodiscard]] std::size_t sure_record() const noexcept;
+  /// Whether a record lies whole in the buffer, and another one follows.
+  [[nodiscard]] bool is_sure_record() const noexcept;
   bool ensure(std::size_t n);
   Look look_at(std::size_t position, std::size_t& length);
   bool may_begin_record(std::size_t position);
   std::optional<std::size_t> next_sure_record(std::size_t position, std::size_t limit);
   [[nodiscard]] std::size_t next_sync(std::size_t position);
-  void take(LogEvent& event);
+  void read_block();
+  /// What lies `position` bytes after the last one consumed. Precondition: read.
+  [[nodiscard]] const std::uint8_t* at(std::size_t position) const noexcept {
+    return buffer_.data() + begin_ + position;
+  }
+  /// Read and not yet consumed.
+  [[nodiscard]] std::size_t available() const noexcept { return end_ - begin_; }
+  void take(LogEventView& event);
 
   std::ifstream file_;
-  std::vector<std::uint8_t> buffer_;  // what is read and not yet consumed begins at begin_
+  std::vector<std::uint8_t> buffer_;  // room; what is read and not yet consumed is [begin_, end_) of it
   std::size_t begin_ = 0;
+  std::size_t end_ = 0;
   std::uint64_t read_ = 0;  // of the file
+  std::uint64_t given_ = 0;
+  std::uint64_t kept_ = kNothingKept;
   std::function<void(std::uint64_t)> on_read_;
-  Unwanted unwanted_;
   std::uint64_t bytes_skipped_ = 0;
   std::uint64_t bytes_cut_off_ = 0;
 };

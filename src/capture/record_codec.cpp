@@ -184,7 +184,7 @@ std::vector<std::uint8_t> encode(const RunException& exception, const std::strin
   return encode_message(message);
 }
 
-std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& message) {
+std::optional<CaptureRecord> decode_record(std::span<const std::uint8_t> message) {
   if (message.size() < sizeof(std::int64_t)) return std::nullopt;
   const std::int64_t fingerprint = fingerprint_of(message);
   if (fingerprint == raw_t::getHash()) {

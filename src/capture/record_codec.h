@@ -62,7 +62,7 @@ struct RecordClock {
 
 /// What a message of a capture says, recognised by the fingerprint of its type, not by its channel. Nothing
 /// for a message of another type (a capture may hold published messages) and for one that is damaged.
-[[nodiscard]] std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& message);
+[[nodiscard]] std::optional<CaptureRecord> decode_record(std::span<const std::uint8_t> message);
 
 /// Bytes of a device, without a copy; nothing for any other message and for one that is damaged.
 [[nodiscard]] std::optional<RawView> view_raw(std::span<const std::uint8_t> message) noexcept;

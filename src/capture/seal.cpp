@@ -60,7 +60,7 @@ std::uint32_t crc32_of(std::span<const std::uint8_t> bytes, std::uint32_t before
   return static_cast<std::uint32_t>(::crc32_z(before, bytes.data(), bytes.size()));
 }
 
-std::uint32_t crc32_of(const LogEvent& event) {
+std::uint32_t crc32_of(const LogEventView& event) {
   const auto header = event_log_header(event.number, event.utime, event.channel.size(), event.data.size());
   const std::span channel(reinterpret_cast<const std::uint8_t*>(event.channel.data()), event.channel.size());
   return crc32_of(event.data, crc32_of(channel, crc32_of(header)));
@@ -114,11 +114,13 @@ std::optional<capture_index_t> decode_index(std::span<const std::uint8_t> messag
   return decode_checked<capture_index_t>(message);
 }
 
-bool is_seal_or_index(const LogEvent& event) {
+bool is_seal_or_index(const LogEventView& event) {
   return claims_to_be<capture_seal_t>(event.data) || claims_to_be<capture_index_t>(event.data) ||
          is_of_kind(event.channel, kSealKind) || is_of_kind(event.channel, kIndexKind);
 }
 
-bool is_surely_no_seal(const LogEvent& event) { return is_raw(event.data) && is_of_device(event.channel); }
+bool is_surely_no_seal(const LogEventView& event) {
+  return is_raw(event.data) && is_of_device(event.channel);
+}
 
 }  // namespace imuscope

@@ -19,7 +19,7 @@ namespace imuscope {
 [[nodiscard]] std::uint32_t crc32_of(std::span<const std::uint8_t> bytes, std::uint32_t before = 0) noexcept;
 
 /// CRC-32 of a record as it stands in the file.
-[[nodiscard]] std::uint32_t crc32_of(const LogEvent& event);
+[[nodiscard]] std::uint32_t crc32_of(const LogEventView& event);
 
 /// Their channels are PREFIX_SEAL and PREFIX_INDEX.
 inline constexpr std::string_view kSealKind = "SEAL";
@@ -56,8 +56,8 @@ class Sealer {
 [[nodiscard]] std::optional<capture_index_t> decode_index(std::span<const std::uint8_t> message);
 
 /// Whether a record claims to be a seal or an index, by its message or its channel.
-[[nodiscard]] bool is_seal_or_index(const LogEvent& event);
+[[nodiscard]] bool is_seal_or_index(const LogEventView& event);
 /// Of device bytes, as nearly all are: told by one look, and neither of the two.
-[[nodiscard]] bool is_surely_no_seal(const LogEvent& event);
+[[nodiscard]] bool is_surely_no_seal(const LogEventView& event);
 
 }  // namespace imuscope

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -45,30 +46,32 @@ class SealedLog {
   /// See EventLogReader.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { log_.on_read(std::move(listener)); }
 
-  /// See EventLogReader. Records that nobody wants are not held against their seal either, and count as missing in
-  /// health().
-  void pass_over(EventLogReader::Unwanted unwanted) { log_.pass_over(std::move(unwanted)); }
+  /// Records whose data nobody wants: passed over. They are not held against their seal either, and count as missing
+  /// in health().
+  using Unwanted = std::function<bool(std::span<const std::uint8_t> data)>;
+  void pass_over(Unwanted unwanted) { unwanted_ = std::move(unwanted); }
 
-  /// Fetches the next record. Returns false at the end of the file.
-  [[nodiscard]] bool next(LogEvent& event);
+  /// Fetches the next record, which stays where it is until the next call. Returns false at the end of the file.
+  [[nodiscard]] bool next(LogEventView& event);
+  /// The same as a copy.
+  [[nodiscard]] bool next(LogEvent& event) { return copy_next(*this, event); }
 
   /// So far.
   [[nodiscard]] LogHealth health() const;
 
  private:
   explicit SealedLog(EventLogReader log) : log_(std::move(log)) {}
-  void take(LogEvent&& event);
-  void hold(LogEvent&& event);
+  void take(const LogEventView& event);
+  void release_what_waited_long();
   void check(const capture_seal_t& seal);
   void release_all();
 
   EventLogReader log_;
-  std::vector<LogEvent> spares_;   ///< memory of records that were given
-  std::optional<LogEvent> index_;  ///< that was read last
-  std::deque<LogEvent> held_;
-  std::size_t released_ = 0;          ///< of those held, from the front
-  std::size_t waiting_bytes_ = 0;     ///< of those held and not released
-  std::uint64_t given_unsealed_ = 0;  ///< since the last seal
+  Unwanted unwanted_;
+  std::optional<std::uint64_t> index_;  ///< place of one that was read last
+  std::deque<std::uint64_t> held_;      ///< places of records, whose bytes the reader keeps
+  std::size_t released_ = 0;            ///< of those held, from the front
+  std::uint64_t given_unsealed_ = 0;    ///< since the last seal
   LogHealth health_;
 };
 

@@ -19,8 +19,9 @@ class CaptureMessages final : public RecordedMessages {
       : file_(std::move(file)), files_(std::move(files)) {}
 
   bool next(std::vector<std::uint8_t>& message) override {
-    if (!files_->next(event_)) return false;
-    message.swap(event_.data);
+    LogEventView event;
+    if (!files_->next(event)) return false;
+    message.assign(event.data.begin(), event.data.end());
     return true;
   }
 
@@ -43,7 +44,6 @@ class CaptureMessages final : public RecordedMessages {
  private:
   std::filesystem::path file_;
   std::optional<CaptureFiles> files_;
-  LogEvent event_;
 };
 
 }  // namespace

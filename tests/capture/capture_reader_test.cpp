@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -266,6 +267,52 @@ TEST(CaptureReader, OneDeviceAloneIsWhatTheWholeHoldsOfIt) {
   auto none = CaptureReader::open(path, "mtx");
   ASSERT_TRUE(none.has_value());
   EXPECT_TRUE(read_all(*none).empty());
+}
+
+/// Memory in use now, as the system counts it.
+std::size_t resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t size = 0;
+  std::size_t resident = 0;
+  statm >> size >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+/// A device that fell silent: its last record waits for a seal, or for what comes next, and what others sent since is not
+/// kept with it.
+TEST(CaptureReader, WhatOthersSentIsNotHeldForADeviceThatFellSilent) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  const RunHeader run = example_run();
+  constexpr std::size_t kRecords = 12'000;
+  constexpr std::size_t kRecordBytes = 4096;
+  std::ofstream file(path, std::ios::binary);
+  std::int64_t number = 0;
+  const auto put = [&](const std::string& channel, const Bytes& data) {
+    Bytes head;
+    append_record_head(head, number++, 1, channel, data.size());
+    for (const Bytes& bytes : {head, data})
+      file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  };
+  put("IMUSCOPE_RUN", encode(run, 0));
+  const auto chunk = [&](DeviceIndex device, std::int64_t sequence, const Bytes& bytes) {
+    const RawChunk read{
+        {sequence, kT0 + std::chrono::milliseconds(sequence), device, Direction::kRead, false}, bytes};
+    put("IMUSCOPE_RAW_X", encode(read, run.devices.at(device), {run.t0, run.t0_wall}));
+  };
+  chunk(1, 0, {1, 2, 3});
+  const Bytes others(kRecordBytes, 7);
+  for (std::size_t i = 0; i < kRecords; ++i) chunk(0, static_cast<std::int64_t>(i), others);
+  chunk(1, 1, {4, 5, 6});
+  file.close();
+
+  auto reader = CaptureReader::open(path, "mtx1");
+  ASSERT_TRUE(reader.has_value());
+  const std::size_t before = resident_bytes();
+  const auto reads = read_all(*reader);
+  EXPECT_LT(resident_bytes(), before + kRecords * kRecordBytes / 4);
+  ASSERT_EQ(reads.size(), 2U);
+  EXPECT_EQ(reads[0].bytes, (Bytes{1, 2, 3}));
+  EXPECT_EQ(reads[1].bytes, (Bytes{4, 5, 6}));
 }
 
 /// What the others sent is not even looked at, which may not change what is taken for damage.

@@ -70,7 +70,7 @@ std::vector<std::string> names_in(const Descriptor& folder) {
 /// Begins with the header of a run.
 bool begins_as_a_run(const std::filesystem::path& run) {
   auto capture = CaptureFiles::open(run / kCaptureName);
-  LogEvent event;
+  LogEventView event;
   return capture && capture->next(event) && event.channel.ends_with("_RUN");
 }
 
