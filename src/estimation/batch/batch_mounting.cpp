@@ -322,8 +322,10 @@ class Batch {
     information.diagonal() += scales_.precision();
     const Eigen::GeneralizedSelfAdjointEigenSolver<Covariance> shares(equations_.of_noise, information);
     // With V' information V = I: information - noise = V^-T (I - shares) V^-1.
-    const ParameterVector left =
-        (ParameterVector::Ones() - shares.eigenvalues()).cwiseMax(1.0 - kMostNoise).cwiseInverse();
+    // What shows of the noise scatters about nothing where there is none.
+    const ParameterVector left = (ParameterVector::Ones() - shares.eigenvalues().cwiseMax(0.0))
+                                     .cwiseMax(1.0 - kMostNoise)
+                                     .cwiseInverse();
     const Covariance& V = shares.eigenvectors();
     // The noise in the derivatives is no information, yet the score has its variance.
     return {V * left.asDiagonal() * V.transpose(), V * left.cwiseAbs2().asDiagonal() * V.transpose()};
@@ -358,7 +360,19 @@ class Batch {
     return shares;
   }
 
+  /// B-13a: the normal equations with the noise in the derivatives as it shows.
+  void show_noise_in_equations(const Spectra& study, const Residuals& residual,
+                               const ReferenceNoise& reference) {
+    auto sums = band_sums(problem_, study, residual, estimate_, noise_, reference, true);
+    show_noise(problem_, study, residual, estimate_, noise_, reference, sums);
+    equations_ = normal_equations(sums, estimate_);
+  }
+
   void finish(BatchMounting& result) {
+    const Spectra study = study_spectra();
+    const Residuals residual = residuals(problem_, study, estimate_);
+    const ReferenceNoise reference = reference_noise(study);
+    show_noise_in_equations(study, residual, reference);
     const OfNoise of_noise = honest_covariance();
     const Covariance& by_noise = of_noise.covariance;
     const Covariance by_scatter = scatter_covariance(of_noise.per_slope);
@@ -380,9 +394,6 @@ class Batch {
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = published.sensor;
     add_change(of_noise, result);
-    const Spectra study = study_spectra();
-    const Residuals residual = residuals(problem_, study, estimate_);
-    const ReferenceNoise reference = reference_noise(study);
     add_unknown_shares(of_noise, published.derivative, study, residual, reference, result);
     add_mean_motion(result);
     // B-21

@@ -140,6 +140,17 @@ Motion estimated_motion(Motion motion, const Weight& weight, const Vector6c& wei
   return motion;
 }
 
+/// The motion as the S-IMU alone shows it (B-13a): with what of the residual the reference would have to have missed.
+Motion motion_of_study(Motion motion, const Transfer& t, const Weight& weight, const Vector6c& residual,
+                       double frequency_hz) {
+  const Vector3c omega = t.gyro.cast<complex<double>>().partialPivLu().solve(residual.head<3>());
+  const Vector3c of_arm = weight.of_reference.bottomLeftCorner<3, 3>() * omega;
+  motion.omega += omega;
+  motion.f += t.accel.cast<complex<double>>().partialPivLu().solve(residual.tail<3>() - of_arm);
+  motion.arm += skew_c(derivative(frequency_hz) * omega);
+  return motion;
+}
+
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, kColumns + 1, Eigen::RowMajor>;
 /// One-sided: every frequency but zero stands for its negative, too.
 double sides(double frequency_hz) { return frequency_hz > 0.0 ? 2.0 : 1.0; }
@@ -252,6 +263,33 @@ class BandSummer {
     return sums;
   }
 
+  /// B-13a: the information that both IMUs have in common.
+  Eigen::Matrix<double, kColumns, kColumns> common(Eigen::Index band) {
+    const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
+    set_forces_tell(band);
+    Eigen::Matrix<double, kColumns, kColumns> sum = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+    WhitenedRows of_reference(problem_.bands.width(band));
+    WhitenedRows of_study(problem_.bands.width(band));
+    for (Eigen::Index w = 0; w < static_cast<Eigen::Index>(problem_.plan.starts.size()); ++w) {
+      for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
+        const double f_hz = problem_.plan.frequency_hz(k);
+        const Weight weight = weight_at(t, band, w, k);
+        const Motion motion = motion_of(problem_.reference, w, k);
+        const Vector6c e = residual_.row(w * problem_.plan.n_frequencies + k).transpose();
+        const Eigen::Index place = k - problem_.bands.first(band);
+        differentiate(t, weight, motion, w, k);
+        of_reference.put(place, J_, Vector6c::Zero(), f_hz);
+        differentiate(t, weight, motion_of_study(motion, t, weight, e, f_hz), w, k);
+        of_study.put(place, J_, Vector6c::Zero(), f_hz);
+      }
+      sum.noalias() +=
+          of_reference.gyros.leftCols<kColumns>().transpose() * of_study.gyros.leftCols<kColumns>();
+      sum.noalias() +=
+          of_reference.accels.leftCols<kColumns>().transpose() * of_study.accels.leftCols<kColumns>();
+    }
+    return 0.5 * (sum + sum.transpose());
+  }
+
  private:
   /// @return  the reference's mean share of the band's noise
   Eigen::Vector2d set_forces_tell(Eigen::Index band) {
@@ -269,17 +307,28 @@ class BandSummer {
   /// Residual and, in J_, derivatives of one window at one frequency.
   Whitened whitened(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k) {
     const double f_hz = problem_.plan.frequency_hz(k);
-    const Vector6 power = noise_.window_power(w, band);
-    const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
-    const Weight weight = weight_of(t, power, of_reference[0], of_reference[1], forces_tell_, f_hz);
+    const Weight weight = weight_at(t, band, w, k);
     Vector6c e = residual_.row(w * problem_.plan.n_frequencies + k).transpose();
     weight.factor.matrixL().solveInPlace(e);
     Motion motion = motion_of(problem_.reference, w, k);
     if (corrected_) motion = estimated_motion(motion, weight, weight.factor.matrixU().solve(e), f_hz);
-    const Vector3c study_f = study_.row(w, k).tail<3>().transpose();
-    jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], f_hz, problem_.from_middle_s[w], J_);
-    weight.factor.matrixL().solveInPlace(J_);
+    differentiate(t, weight, motion, w, k);
     return {weight, motion, e};
+  }
+
+  [[nodiscard]] Weight weight_at(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k) const {
+    const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
+    return weight_of(t, noise_.window_power(w, band), of_reference[0], of_reference[1], forces_tell_,
+                     problem_.plan.frequency_hz(k));
+  }
+
+  /// Whitened derivatives, in J_.
+  void differentiate(const Transfer& t, const Weight& weight, const Motion& motion, Eigen::Index w,
+                     Eigen::Index k) {
+    const Vector3c study_f = study_.row(w, k).tail<3>().transpose();
+    jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], problem_.plan.frequency_hz(k),
+             problem_.from_middle_s[w], J_);
+    weight.factor.matrixL().solveInPlace(J_);
   }
 
   void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, WhitenedRows& rows,
@@ -393,6 +442,16 @@ std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study, co
     sums[band] = summer.sum(static_cast<Eigen::Index>(band));
   });
   return sums;
+}
+
+// B-13a
+void show_noise(const Problem& problem, const Spectra& study, const Residuals& residual,
+                const Estimate& estimate, const NoiseBands& noise, const ReferenceNoise& reference,
+                std::vector<BandSums>& sums) {
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t band) {
+    BandSummer summer(problem, study, residual, estimate, noise, reference, true);
+    sums[band].of_noise = sums[band].information - summer.common(static_cast<Eigen::Index>(band));
+  });
 }
 
 // B-21, B-14

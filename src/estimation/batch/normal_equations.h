@@ -55,6 +55,12 @@ struct BandSums {
                                               const NoiseBands& noise, const ReferenceNoise& reference,
                                               bool corrected);
 
+/// B-13a: replaces what `of_noise` of every band supposes by what the records show of it.
+/// @param sums  of the same, corrected
+void show_noise(const Problem& problem, const Spectra& study, const Residuals& residual,
+                const Estimate& estimate, const NoiseBands& noise, const ReferenceNoise& reference,
+                std::vector<BandSums>& sums);
+
 /// Normal equations of the sensor's parameters; the bands' deviations are eliminated (B-14).
 struct NormalEquations {
   Eigen::Matrix<double, kParameters, kParameters> information;

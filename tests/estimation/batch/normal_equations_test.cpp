@@ -1,6 +1,8 @@
 #include "estimation/batch/normal_equations.h"
 
 #include <gtest/gtest.h>
+#include <cmath>
+#include <complex>
 #include <random>
 
 #include "estimation/navigation/so3.h"
@@ -166,6 +168,105 @@ TEST(NormalEquations, NoiseOfTheReferenceIsNoInformation) {
   EXPECT_LT(equations.of_noise(kLeverArm, kLeverArm), equations.information(kLeverArm, kLeverArm));
   const auto without = drawn.equations(noise, 1e-12, true);
   EXPECT_LT(without.of_noise(kLeverArm, kLeverArm), 1e-9 * without.information(kLeverArm, kLeverArm));
+}
+
+/// Two IMUs as noisy as each other on one slow motion, which neither shows as it is.
+struct NoisyPair {
+  Problem problem;
+  Spectra study;
+  Spectra true_motion;
+  Estimate estimate;
+  NoiseBands noise;
+
+  NoisyPair() {
+    constexpr Eigen::Index kInstants = 6'000;
+    constexpr double kRate_hz = 50.0;
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    const auto white = [&](Eigen::Index columns) {
+      return Eigen::MatrixXd::NullaryExpr(kInstants, columns, [&] { return normal(random); }).eval();
+    };
+    Eigen::MatrixXd motion = white(kReferenceColumns);
+    for (Eigen::Index i = 1; i < kInstants; ++i) motion.row(i) += 0.9 * motion.row(i - 1);
+    Eigen::MatrixXd seen = motion;
+    seen.leftCols<6>() += white(6);
+    problem.plan = plan_windows(std::vector<char>(kInstants, 1), kRate_hz, 8.0);
+    problem.bands = Bands(problem.plan.n_frequencies);
+    problem.constant = window_spectrum(problem.plan);
+    problem.reference = Spectra(problem.plan, seen);
+    true_motion = Spectra(problem.plan, motion);
+    study = Spectra(problem.plan, (motion.leftCols<6>() + white(6)).eval());
+    const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
+    problem.from_middle_s.setLinSpaced(n_windows, -1.0, 1.0);
+    problem.mean_gyro_power.setConstant(problem.bands.size(), 1e9);
+    estimate.deviation.assign(static_cast<std::size_t>(problem.bands.size()), DeviationVector::Zero());
+    estimate.deviation_sd.setConstant(problem.bands.size(), 2, 1e-9);
+    noise = NoiseBands(problem.bands, n_windows, problem.plan.n_frequencies, residual(),
+                       Eigen::MatrixX2d::Zero(problem.bands.size(), 2));
+  }
+
+  [[nodiscard]] Residuals residual() const { return residuals(problem, study, estimate); }
+  /// As if the S-IMU's readings were so much later, or its clock so much faster.
+  [[nodiscard]] Residuals residual_with(Eigen::Index parameter, double step) const {
+    Residuals e = residual();
+    for (Eigen::Index w = 0; w < problem.from_middle_s.size(); ++w) {
+      const double by_s = parameter == kTimeOffset ? step : step * problem.from_middle_s[w];
+      for (Eigen::Index k = 0; k < problem.plan.n_frequencies; ++k) {
+        const std::complex<double> turn = std::exp(-by_s * derivative(problem.plan.frequency_hz(k)));
+        e.row(w * problem.plan.n_frequencies + k) += (turn - 1.0) * study.row(w, k);
+      }
+    }
+    return e;
+  }
+  [[nodiscard]] std::vector<BandSums> sums(const Residuals& e, const ReferenceNoise& reference) const {
+    return band_sums(problem, study, e, estimate, noise, reference, true);
+  }
+  [[nodiscard]] ParameterVector known(const ReferenceNoise& reference, bool as_it_shows) const {
+    auto all = sums(residual(), reference);
+    if (as_it_shows) show_noise(problem, study, residual(), estimate, noise, reference, all);
+    const auto equations = normal_equations(all, estimate);
+    return (equations.information - equations.of_noise).diagonal();
+  }
+  /// What the motion itself would tell.
+  [[nodiscard]] ParameterVector told_by_true_motion() const {
+    Problem of_truth = problem;
+    of_truth.reference = true_motion;
+    const auto none = ReferenceNoise::even(problem.bands, 0.0);
+    return normal_equations(band_sums(of_truth, study, residual(), estimate, noise, none, false), estimate)
+        .information.diagonal();
+  }
+};
+
+/// B-13a against the gradient itself: how it changes when the S-IMU's readings are moved in time.
+TEST(NormalEquations, WhatBothImusKnowOfTimeIsTheSlopeOfTheGradient) {
+  const NoisyPair pair;
+  for (const double share : {0.2, 0.5, 0.7}) {
+    const auto reference = ReferenceNoise::even(pair.problem.bands, share);
+    const ParameterVector known = pair.known(reference, true);
+    for (const Eigen::Index i : {Eigen::Index{kTimeOffset}, Eigen::Index{kClockRate}}) {
+      constexpr double kStep = 1e-5;
+      const auto gradient = [&](double step) {
+        return normal_equations(pair.sums(pair.residual_with(i, step), reference), pair.estimate).gradient[i];
+      };
+      const double slope = -(gradient(kStep) - gradient(-kStep)) / (2.0 * kStep);
+      EXPECT_NEAR(known[i] / slope, 1.0, 1e-4) << "parameter " << i << ", share " << share;
+    }
+  }
+}
+
+/// B-13a against the motion that neither IMU shows, whatever is believed of their noise.
+TEST(NormalEquations, WhatBothImusKnowIsWhatTheMotionTells) {
+  const NoisyPair pair;
+  const ParameterVector truth = pair.told_by_true_motion();
+  constexpr double kWrong = 0.2;  // of the noise half is the reference's
+  for (const double share : {kWrong, 0.5, 0.7}) {
+    const ParameterVector known = pair.known(ReferenceNoise::even(pair.problem.bands, share), true);
+    for (const Eigen::Index i : {Eigen::Index{kPsi}, Eigen::Index{kTimeOffset}, Eigen::Index{kClockRate},
+                                 Eigen::Index{kGyroShape}, Eigen::Index{kAlpha}, Eigen::Index{kAccelDelay}})
+      EXPECT_NEAR(known[i] / truth[i], 1.0, 0.03) << "parameter " << i << ", share " << share;
+  }
+  const ParameterVector supposed = pair.known(ReferenceNoise::even(pair.problem.bands, kWrong), false);
+  EXPECT_GT(supposed[kTimeOffset], 1.05 * truth[kTimeOffset]);
 }
 
 /// B-24: the published frame describes the same sensor, and its derivative is that of the parameters.
