@@ -214,12 +214,16 @@ bool EventLogReader::is_sure_record() const noexcept {
   return length + kSyncBytes <= available() && is_sync(at(length));
 }
 
-bool EventLogReader::next(LogEventView& event) {
+EventLogReader::Next EventLogReader::look_for(LogEventView& event) {
   if (is_sure_record()) {
     take(event);
-    return true;
+    return Next::kEvent;
   }
   while (ensure(1)) {
+    if (kept_ != kNothingKept && place() - looked_from_ > kDamageMostBytes) {
+      looked_from_ = place();
+      return Next::kFar;
+    }
     std::size_t skip = 1;
     std::size_t length = 0;
     const Look look = look_at(0, length);
@@ -228,7 +232,7 @@ bool EventLogReader::next(LogEventView& event) {
       const auto inside = may_begin_record(length) ? std::nullopt : next_sure_record(0, length);
       if (!inside) {
         take(event);
-        return true;
+        return Next::kEvent;
       }
       skip = *inside;
     } else if (look == Look::kCutOff) {
@@ -236,7 +240,7 @@ bool EventLogReader::next(LogEventView& event) {
       if (!behind) {
         bytes_cut_off_ = available();
         begin_ = end_;
-        return false;
+        return Next::kEnd;
       }
       skip = *behind;
     }
@@ -244,13 +248,14 @@ bool EventLogReader::next(LogEventView& event) {
     begin_ += skip;
     bytes_skipped_ += skip;
   }
-  return false;
+  return Next::kEnd;
 }
 
 void EventLogReader::go_to(std::uint64_t place) {
   begin_ = 0;
   end_ = 0;
   kept_ = kNothingKept;
+  looked_from_ = place;
   read_ = place;
   file_.clear();
   file_.seekg(static_cast<std::streamoff>(place));
@@ -264,6 +269,7 @@ void EventLogReader::take(LogEventView& event) {
   given_ = place();
   event = view_of(at(0));
   begin_ += lengths_of(at(0)).record();
+  looked_from_ = place();
 }
 
 }  // namespace imuscope

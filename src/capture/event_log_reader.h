@@ -35,7 +35,7 @@ class EventLogReader {
   void on_read(std::function<void(std::uint64_t bytes)> listener) { on_read_ = std::move(listener); }
 
   /// Fetches the next event, which stays where it is until the next call. Returns false at the end of the file.
-  [[nodiscard]] bool next(LogEventView& event);
+  [[nodiscard]] bool next(LogEventView& event) { return look_for(event) == Next::kEvent; }
   /// The same as a copy.
   [[nodiscard]] bool next(LogEvent& event) { return copy_next(*this, event); }
 
@@ -47,6 +47,11 @@ class EventLogReader {
 
   /// What was read is kept from here on, until another place is told. Precondition: not before the one told last.
   void keep_from(std::uint64_t place) noexcept { kept_ = place; }
+  /// As next() where something is kept: kFar after so many bytes of damage without an event, which are kept with it. Another
+  /// call goes on from there.
+  static constexpr std::uint64_t kDamageMostBytes = std::uint64_t{8} << 20U;
+  enum class Next : std::uint8_t { kEvent, kEnd, kFar };
+  [[nodiscard]] Next look_for(LogEventView& event);
   /// An event that was given, and is kept; stays where it is until the next call of next().
   [[nodiscard]] LogEventView event_at(std::uint64_t place) const noexcept;
 
@@ -83,6 +88,7 @@ class EventLogReader {
   std::size_t end_ = 0;
   std::uint64_t read_ = 0;  // of the file
   std::uint64_t given_ = 0;
+  std::uint64_t looked_from_ = 0;  ///< behind the event that was given last, or where look_for() gave up
   std::uint64_t kept_ = kNothingKept;
   std::function<void(std::uint64_t)> on_read_;
   std::uint64_t bytes_skipped_ = 0;

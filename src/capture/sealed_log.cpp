@@ -7,7 +7,7 @@ namespace {
 /// without seals, and nothing is held for long.
 constexpr std::size_t kWaitForFirstSealBytes = std::size_t{64} << 10U;
 /// Seals are nearer to each other than any record is long.
-constexpr std::size_t kWaitForSealBytes = std::size_t{8} << 20U;
+constexpr std::size_t kWaitForSealBytes = EventLogReader::kDamageMostBytes;
 
 bool stands_where_it_was_put(const capture_seal_t& seal, const LogEventView& event) {
   return seal.utime == event.utime && event.number - seal.n_records == seal.first_number;
@@ -24,12 +24,15 @@ Result<SealedLog> SealedLog::open(const std::filesystem::path& path, EventLogRea
 bool SealedLog::next(LogEventView& event) {
   while (released_ == 0) {
     log_.keep_from(!held_.empty() ? held_.front() : index_.value_or(log_.place()));
-    if (log_.next(event)) {
+    const auto found = log_.look_for(event);
+    if (found == EventLogReader::Next::kEvent) {
       take(event);
       release_what_waited_long();
       continue;
     }
-    if (held_.empty()) return false;
+    // Behind so much damage, or at the end, nothing comes any more that a record could wait for.
+    if (index_ && found == EventLogReader::Next::kFar) held_.push_back(*std::exchange(index_, std::nullopt));
+    if (held_.empty() && found == EventLogReader::Next::kEnd) return false;
     release_all();
   }
   event = log_.event_at(held_.front());

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +12,7 @@
 
 #include "capture/capture_writer.h"
 #include "publish/message_codec.h"
+#include "tests/support/resident_memory.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -269,15 +269,6 @@ TEST(CaptureReader, OneDeviceAloneIsWhatTheWholeHoldsOfIt) {
   EXPECT_TRUE(read_all(*none).empty());
 }
 
-/// Memory in use now, as the system counts it.
-std::size_t resident_bytes() {
-  std::ifstream statm("/proc/self/statm");
-  std::size_t size = 0;
-  std::size_t resident = 0;
-  statm >> size >> resident;
-  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-}
-
 /// A device that fell silent: its last record waits for a seal, or for what comes next, and what others sent since is not
 /// kept with it.
 TEST(CaptureReader, WhatOthersSentIsNotHeldForADeviceThatFellSilent) {
@@ -307,9 +298,9 @@ TEST(CaptureReader, WhatOthersSentIsNotHeldForADeviceThatFellSilent) {
 
   auto reader = CaptureReader::open(path, "mtx1");
   ASSERT_TRUE(reader.has_value());
-  const std::size_t before = resident_bytes();
+  const std::size_t before = test::resident_bytes();
   const auto reads = read_all(*reader);
-  EXPECT_LT(resident_bytes(), before + kRecords * kRecordBytes / 4);
+  EXPECT_LT(test::resident_bytes(), before + kRecords * kRecordBytes / 4);
   ASSERT_EQ(reads.size(), 2U);
   EXPECT_EQ(reads[0].bytes, (Bytes{1, 2, 3}));
   EXPECT_EQ(reads[1].bytes, (Bytes{4, 5, 6}));

@@ -13,6 +13,7 @@
 #include "capture/capture_repair.h"
 #include "capture/capture_writer.h"
 #include "capture/record_codec.h"
+#include "tests/support/resident_memory.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -152,6 +153,55 @@ TEST(SealedLog, ManyRecordsBetweenTwoFlushesAreSealedInParts) {
   EXPECT_EQ(records, static_cast<std::size_t>(kRecords));
   EXPECT_GT(most, 31U << 10U);
   EXPECT_LT(most, 34U << 10U);
+}
+
+TEST(SealedLog, ARecordLongerThanAnyWaitWaitsForItsSeal) {
+  const fs::path path = test::scratch_folder() / "capture.lcm";
+  auto writer = std::move(*CaptureWriter::create(path, "IMUSCOPE", 0));
+  writer.append("IMUSCOPE_RUN", 1, encode(small_run(), 0));
+  EXPECT_TRUE(writer.flush());
+  constexpr std::size_t kLong = std::size_t{20} << 20U;
+  writer.append("POSE", 2, Bytes(kLong, 7));
+  EXPECT_TRUE(writer.close());
+  Bytes bytes = content_of(path);
+  auto read = read_log(path);
+  EXPECT_EQ(read.events.size(), 2U);
+  EXPECT_EQ(read.health.records_unsealed, 0U);
+  bytes[kLong / 2] ^= 1U;
+  put_content(path, bytes);
+  read = read_log(path);
+  EXPECT_EQ(read.events.size(), 1U);
+  EXPECT_EQ(read.health.records_damaged, 1U);
+}
+
+/// What was read before damage is given, and what comes after it, however much of it there is; none of it is kept.
+TEST(SealedLog, DamageThatIsLongerThanAnyWaitIsNotKept) {
+  const auto first = record_files(test::scratch_folder(), 1);
+  const Bytes good = content_of(first);
+  const auto whole = read_log(first);
+  constexpr std::size_t kDamage = std::size_t{64} << 20U;
+  // Within the last reads, whose seal comes after it.
+  const std::size_t place = 3 * good.size() / 4;
+  {
+    std::ofstream file(first, std::ios::binary);
+    const auto put = [&](const std::uint8_t* bytes, std::size_t n) {
+      file.write(reinterpret_cast<const char*>(bytes), static_cast<std::streamsize>(n));
+    };
+    put(good.data(), place);
+    const Bytes zeros(std::size_t{1} << 20U, 0);
+    for (std::size_t n = 0; n < kDamage; n += zeros.size()) put(zeros.data(), zeros.size());
+    put(good.data() + place, good.size() - place);
+  }
+  auto log = SealedLog::open(first);
+  ASSERT_TRUE(log);
+  const std::size_t before = test::resident_bytes();
+  std::size_t most = before;
+  std::size_t found = 0;
+  for (LogEventView event; log->next(event); ++found) most = std::max(most, test::resident_bytes());
+  EXPECT_LT(std::max(most, test::resident_bytes()), before + kDamage / 2);
+  // The one that is torn, and no other.
+  EXPECT_EQ(found, whole.events.size() - 1);
+  EXPECT_GT(log->health().bytes_skipped, kDamage);
 }
 
 /// Wherever the reader knows its place, it goes on from there with the same records when it is sent back.
