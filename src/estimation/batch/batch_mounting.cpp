@@ -186,18 +186,18 @@ class Batch {
                         problem_.plan.n_frequencies, residual, taken_);
     const ReferenceNoise reference =
         rough ? ReferenceNoise::even(problem_.bands, 0.0) : reference_noise(study);
-    const auto sums = band_sums(problem_, study, residual, estimate_, noise_, reference, !rough);
+    sums_ = band_sums(problem_, study, residual, estimate_, noise_, reference, !rough);
     ParameterVector correction;
     std::vector<DeviationVector> deviation;
     for (int inner = 0; inner < (rough ? 1 : kLearningRounds); ++inner) {
-      correction = solve(sums, deviation);
+      correction = solve(sums_, deviation);
       if (!rough) learn(deviation);
     }
     estimate_.sensor.add(correction);
     estimate_.deviation = std::move(deviation);
-    for (std::size_t band = 0; band < sums.size(); ++band)
+    for (std::size_t band = 0; band < sums_.size(); ++band)
       taken_.row(static_cast<Eigen::Index>(band)) =
-          numbers_taken(sums[band], equations_.bands[band], covariance_).transpose();
+          numbers_taken(sums_[band], equations_.bands[band], covariance_).transpose();
     if (!rough) {
       scales_.learn_sizes(estimate_.sensor.x, covariance_);
       scales_.choose_places(estimate_.sensor.x, honest_covariance().per_slope);
@@ -363,9 +363,8 @@ class Batch {
   /// B-13a: the normal equations with the noise in the derivatives as it shows.
   void show_noise_in_equations(const Spectra& study, const Residuals& residual,
                                const ReferenceNoise& reference) {
-    auto sums = band_sums(problem_, study, residual, estimate_, noise_, reference, true);
-    show_noise(problem_, study, residual, estimate_, noise_, reference, sums);
-    equations_ = normal_equations(sums, estimate_);
+    show_noise(problem_, study, residual, estimate_, noise_, reference, sums_);
+    equations_ = normal_equations(sums_, estimate_);
   }
 
   void finish(BatchMounting& result) {
@@ -487,6 +486,7 @@ class Batch {
   Estimate estimate_;
   Eigen::MatrixX2d taken_;  ///< B-11b, of the step before
   NoiseBands noise_;
+  std::vector<BandSums> sums_;  ///< of the last step
   NormalEquations equations_;
   Covariance covariance_;
   double last_share_ = 0.0;  ///< the newest step's largest, of its sd

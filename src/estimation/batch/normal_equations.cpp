@@ -24,6 +24,8 @@ using Jacobian = Eigen::Matrix<complex<double>, 6, kColumns>;
 constexpr double kLargestWeight = 0.9;
 /// Share of what the reference's gyros show that may be their noise, for their derivative to be a motion.
 constexpr double kNoisyMotion = 0.2;
+/// Windows, evenly over the record, that tell its noise: a band's numbers in them are some thousand.
+constexpr Eigen::Index kWindowsOfShownNoise = 24;
 /// Factor of a variance that leaves no weight.
 constexpr double kTellsNothing = 1e6;
 
@@ -263,31 +265,40 @@ class BandSummer {
     return sums;
   }
 
-  /// B-13a: the information that both IMUs have in common.
-  Eigen::Matrix<double, kColumns, kColumns> common(Eigen::Index band) {
+  /// B-13a: the information, less what of it both IMUs have in common.
+  Eigen::Matrix<double, kColumns, kColumns> shown_noise(Eigen::Index band) {
     const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
     set_forces_tell(band);
-    Eigen::Matrix<double, kColumns, kColumns> sum = Eigen::Matrix<double, kColumns, kColumns>::Zero();
-    WhitenedRows of_reference(problem_.bands.width(band));
-    WhitenedRows of_study(problem_.bands.width(band));
-    for (Eigen::Index w = 0; w < static_cast<Eigen::Index>(problem_.plan.starts.size()); ++w) {
+    Eigen::Matrix<double, kColumns, kColumns> all = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+    Eigen::Matrix<double, kColumns, kColumns> common = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+    const Eigen::Index width = problem_.bands.width(band);
+    WhitenedRows of_both(width);
+    WhitenedRows of_reference(width);
+    WhitenedRows of_study(width);
+    const auto n_windows = static_cast<Eigen::Index>(problem_.plan.starts.size());
+    const Eigen::Index step = (n_windows - 1) / kWindowsOfShownNoise + 1;
+    Eigen::Index looked_at = 0;
+    for (Eigen::Index w = step / 2; w < n_windows; w += step, ++looked_at) {
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
         const double f_hz = problem_.plan.frequency_hz(k);
-        const Weight weight = weight_at(t, band, w, k);
+        const Eigen::Index place = k - problem_.bands.first(band);
+        const Weight weight = fill(t, band, w, k, of_both, place);
         const Motion motion = motion_of(problem_.reference, w, k);
         const Vector6c e = residual_.row(w * problem_.plan.n_frequencies + k).transpose();
-        const Eigen::Index place = k - problem_.bands.first(band);
         differentiate(t, weight, motion, w, k);
         of_reference.put(place, J_, Vector6c::Zero(), f_hz);
         differentiate(t, weight, motion_of_study(motion, t, weight, e, f_hz), w, k);
         of_study.put(place, J_, Vector6c::Zero(), f_hz);
       }
-      sum.noalias() +=
-          of_reference.gyros.leftCols<kColumns>().transpose() * of_study.gyros.leftCols<kColumns>();
-      sum.noalias() +=
-          of_reference.accels.leftCols<kColumns>().transpose() * of_study.accels.leftCols<kColumns>();
+      for (const auto triad : {&WhitenedRows::gyros, &WhitenedRows::accels}) {
+        add_information(of_both.*triad, all);
+        common.noalias() +=
+            (of_reference.*triad).leftCols<kColumns>().transpose() * (of_study.*triad).leftCols<kColumns>();
+      }
     }
-    return 0.5 * (sum + sum.transpose());
+    all = all.selfadjointView<Eigen::Lower>();
+    const double share = static_cast<double>(n_windows) / static_cast<double>(looked_at);
+    return share * (all - 0.5 * (common + common.transpose()));
   }
 
  private:
@@ -331,10 +342,11 @@ class BandSummer {
     weight.factor.matrixL().solveInPlace(J_);
   }
 
-  void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, WhitenedRows& rows,
-            Eigen::Index place) {
+  Weight fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, WhitenedRows& rows,
+              Eigen::Index place) {
     const Whitened at = whitened(t, band, w, k);
     rows.put(place, J_, at.e, problem_.plan.frequency_hz(k));
+    return at.weight;
   }
 
   /// B-13: derivatives that the motion's own uncertainty alone would have. What counts is the reference's
@@ -450,7 +462,7 @@ void show_noise(const Problem& problem, const Spectra& study, const Residuals& r
                 std::vector<BandSums>& sums) {
   tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t band) {
     BandSummer summer(problem, study, residual, estimate, noise, reference, true);
-    sums[band].of_noise = sums[band].information - summer.common(static_cast<Eigen::Index>(band));
+    sums[band].of_noise = summer.shown_noise(static_cast<Eigen::Index>(band));
   });
 }
 

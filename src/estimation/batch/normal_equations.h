@@ -55,8 +55,9 @@ struct BandSums {
                                               const NoiseBands& noise, const ReferenceNoise& reference,
                                               bool corrected);
 
-/// B-13a: replaces what `of_noise` of every band supposes by what the records show of it.
-/// @param sums  of the same, corrected
+/// B-13a: replaces what `of_noise` of every band supposes by what the records show of it, in some of the windows where there
+/// are many.
+/// @param sums  of the same records, corrected
 void show_noise(const Problem& problem, const Spectra& study, const Residuals& residual,
                 const Estimate& estimate, const NoiseBands& noise, const ReferenceNoise& reference,
                 std::vector<BandSums>& sums);
