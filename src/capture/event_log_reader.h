@@ -34,7 +34,8 @@ class EventLogReader {
   /// Is told, now and then, how many bytes of the file have been read.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { on_read_ = std::move(listener); }
 
-  /// Fetches the next event, which stays where it is until the next call. Returns false at the end of the file.
+  /// Fetches the next event, which stays where it is until the next call. Returns false at the end of the file. Where
+  /// something is kept, look_for() is the one to call.
   [[nodiscard]] bool next(LogEventView& event) { return look_for(event) == Next::kEvent; }
   /// The same as a copy.
   [[nodiscard]] bool next(LogEvent& event) { return copy_next(*this, event); }
@@ -47,12 +48,12 @@ class EventLogReader {
 
   /// What was read is kept from here on, until another place is told. Precondition: not before the one told last.
   void keep_from(std::uint64_t place) noexcept { kept_ = place; }
-  /// As next() where something is kept: kFar after so many bytes of damage without an event, which are kept with it. Another
-  /// call goes on from there.
+  /// What is kept holds the damage behind it in memory: after so much of it without an event look_for() gives up.
   static constexpr std::uint64_t kDamageMostBytes = std::uint64_t{8} << 20U;
   enum class Next : std::uint8_t { kEvent, kEnd, kFar };
+  /// As next(); kFar where it gave up: let go of what is kept, and call again.
   [[nodiscard]] Next look_for(LogEventView& event);
-  /// An event that was given, and is kept; stays where it is until the next call of next().
+  /// An event that was given, and is kept; stays where it is until the next call of next() or look_for().
   [[nodiscard]] LogEventView event_at(std::uint64_t place) const noexcept;
 
   /// Bytes in the midst of the file that belong to no whole record.
@@ -86,8 +87,8 @@ class EventLogReader {
   std::vector<std::uint8_t> buffer_;  // room; what is read and not yet consumed is [begin_, end_) of it
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
-  std::uint64_t read_ = 0;  // of the file
-  std::uint64_t given_ = 0;
+  std::uint64_t read_ = 0;         // of the file
+  std::uint64_t given_ = 0;        ///< place of the event that was given last
   std::uint64_t looked_from_ = 0;  ///< behind the event that was given last, or where look_for() gave up
   std::uint64_t kept_ = kNothingKept;
   std::function<void(std::uint64_t)> on_read_;

@@ -360,7 +360,7 @@ class Batch {
     return shares;
   }
 
-  /// B-13a: the normal equations with the noise in the derivatives as it shows.
+  /// B-13a: the normal equations with the noise in the derivatives as it shows, not as the shares have it.
   void show_noise_in_equations(const Spectra& study, const Residuals& residual,
                                const ReferenceNoise& reference) {
     show_noise(problem_, study, residual, estimate_, noise_, reference, sums_);

@@ -92,41 +92,57 @@ TEST(NormalEquations, GradientIsThatOfTheSumOfSquares) {
   }
 }
 
-/// Windows overlap, and neighbouring frequencies of a window are correlated; all of it has to come out as if
-/// every instant had been counted once.
-TEST(NormalEquations, ScoresOfWhiteNoiseVaryAsTheInformationSays) {
-  constexpr Eigen::Index kInstants = 6'000;
-  constexpr double kRate_hz = 50.0;
-  std::mt19937_64 random(5);
+/// Two minutes at 50 Hz.
+constexpr Eigen::Index kRecordInstants = 6'000;
+
+Eigen::MatrixXd white(std::mt19937_64& random, Eigen::Index columns) {
   std::normal_distribution<double> normal;
-  const auto white = [&](Eigen::Index columns) {
-    return Eigen::MatrixXd::NullaryExpr(kInstants, columns, [&] { return normal(random); }).eval();
-  };
-  // A vehicle's motion is slow.
-  const auto slow = [&](Eigen::Index columns) {
-    Eigen::MatrixXd series = white(columns);
-    for (Eigen::Index i = 1; i < kInstants; ++i) series.row(i) += 0.99 * series.row(i - 1);
-    return series;
-  };
+  return Eigen::MatrixXd::NullaryExpr(kRecordInstants, columns, [&] { return normal(random); });
+}
+
+/// A vehicle's motion is slow: each instant keeps so much of the one before.
+Eigen::MatrixXd slow(std::mt19937_64& random, Eigen::Index columns, double kept) {
+  Eigen::MatrixXd series = white(random, columns);
+  for (Eigen::Index i = 1; i < kRecordInstants; ++i) series.row(i) += kept * series.row(i - 1);
+  return series;
+}
+
+/// Of a record without gaps, up to 8 Hz.
+Problem problem_of(const Eigen::MatrixXd& reference) {
   Problem problem;
-  problem.plan = plan_windows(std::vector<char>(kInstants, 1), kRate_hz, 8.0);
+  problem.plan = plan_windows(std::vector<char>(kRecordInstants, 1), 50.0, 8.0);
   problem.bands = Bands(problem.plan.n_frequencies);
   problem.constant = window_spectrum(problem.plan);
-  problem.reference = Spectra(problem.plan, slow(kReferenceColumns));
-  const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
-  problem.from_middle_s.setLinSpaced(n_windows, -1.0, 1.0);
-  problem.mean_gyro_power.setOnes(problem.bands.size());
+  problem.reference = Spectra(problem.plan, reference);
+  problem.from_middle_s.setLinSpaced(static_cast<Eigen::Index>(problem.plan.starts.size()), -1.0, 1.0);
+  problem.mean_gyro_power.setConstant(problem.bands.size(), 1e9);
+  return problem;
+}
+
+/// A sensor like the reference, on a body that is rigid in every band.
+Estimate rigid_estimate(const Problem& problem) {
   Estimate estimate;
   estimate.deviation.assign(static_cast<std::size_t>(problem.bands.size()), DeviationVector::Zero());
   estimate.deviation_sd.setConstant(problem.bands.size(), 2, 1e-9);
+  return estimate;
+}
+
+/// Windows overlap, and neighbouring frequencies of a window are correlated; all of it has to come out as if
+/// every instant had been counted once.
+TEST(NormalEquations, ScoresOfWhiteNoiseVaryAsTheInformationSays) {
+  std::mt19937_64 random(5);
+  constexpr double kKept = 0.99;
+  const Problem problem = problem_of(slow(random, kReferenceColumns, kKept));
+  const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
+  const Estimate estimate = rigid_estimate(problem);
   const Eigen::MatrixX2d none = Eigen::MatrixX2d::Zero(problem.bands.size(), 2);
   ParameterVector sum = ParameterVector::Zero();
   constexpr int kDraws = 30;
   for (int draw = 0; draw < kDraws; ++draw) {
     // What the S-IMU shows only enters through its g-sensitivity.
-    const Spectra study(problem.plan, slow(6));
+    const Spectra study(problem.plan, slow(random, 6, kKept));
     Residuals noise(n_windows * problem.plan.n_frequencies, 6);
-    const Spectra drawn(problem.plan, white(6));
+    const Spectra drawn(problem.plan, white(random, 6));
     for (Eigen::Index w = 0; w < n_windows; ++w)
       for (Eigen::Index k = 0; k < problem.plan.n_frequencies; ++k)
         noise.row(w * problem.plan.n_frequencies + k) = drawn.row(w, k);
@@ -179,29 +195,15 @@ struct NoisyPair {
   NoiseBands noise;
 
   NoisyPair() {
-    constexpr Eigen::Index kInstants = 6'000;
-    constexpr double kRate_hz = 50.0;
     std::mt19937_64 random(3);
-    std::normal_distribution<double> normal;
-    const auto white = [&](Eigen::Index columns) {
-      return Eigen::MatrixXd::NullaryExpr(kInstants, columns, [&] { return normal(random); }).eval();
-    };
-    Eigen::MatrixXd motion = white(kReferenceColumns);
-    for (Eigen::Index i = 1; i < kInstants; ++i) motion.row(i) += 0.9 * motion.row(i - 1);
+    const Eigen::MatrixXd motion = slow(random, kReferenceColumns, 0.9);
     Eigen::MatrixXd seen = motion;
-    seen.leftCols<6>() += white(6);
-    problem.plan = plan_windows(std::vector<char>(kInstants, 1), kRate_hz, 8.0);
-    problem.bands = Bands(problem.plan.n_frequencies);
-    problem.constant = window_spectrum(problem.plan);
-    problem.reference = Spectra(problem.plan, seen);
+    seen.leftCols<6>() += white(random, 6);
+    problem = problem_of(seen);
     true_motion = Spectra(problem.plan, motion);
-    study = Spectra(problem.plan, (motion.leftCols<6>() + white(6)).eval());
-    const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
-    problem.from_middle_s.setLinSpaced(n_windows, -1.0, 1.0);
-    problem.mean_gyro_power.setConstant(problem.bands.size(), 1e9);
-    estimate.deviation.assign(static_cast<std::size_t>(problem.bands.size()), DeviationVector::Zero());
-    estimate.deviation_sd.setConstant(problem.bands.size(), 2, 1e-9);
-    noise = NoiseBands(problem.bands, n_windows, problem.plan.n_frequencies, residual(),
+    study = Spectra(problem.plan, (motion.leftCols<6>() + white(random, 6)).eval());
+    estimate = rigid_estimate(problem);
+    noise = NoiseBands(problem.bands, problem.from_middle_s.size(), problem.plan.n_frequencies, residual(),
                        Eigen::MatrixX2d::Zero(problem.bands.size(), 2));
   }
 
