@@ -43,6 +43,11 @@ constexpr int kMostIterations = 25;
 constexpr int kRoughIterations = 2;
 /// A step of less than this share of the sd changes nothing that is published.
 constexpr double kSettledShare = 0.1;
+/// Steps that are so alike (cosine) and become no smaller creep.
+constexpr double kAlike = 0.8;
+constexpr double kCreeping = 0.7;
+constexpr double kFastestPace = 4.0;
+constexpr double kSlowestPace = 0.25;
 /// After the last step one of more than this is no approach to anything.
 constexpr double kLostShare = 1.0;
 /// Data sheets have a per cent, cheap parts three; known to so many sd.
@@ -71,15 +76,9 @@ Eigen::MatrixXd reference_series(const Grid& grid, const Eigen::RowVectorXd& mea
   Eigen::MatrixXd series(grid.motion.rows(), kReferenceColumns);
   series.leftCols<6>() = grid.motion.rowwise() - mean;
   series.middleCols<3>(kOmegaDot) = grid.omega_dot;
-  const auto x = grid.motion.col(0).array();
-  const auto y = grid.motion.col(1).array();
-  const auto z = grid.motion.col(2).array();
-  series.col(kProducts) = x * x;
-  series.col(kProducts + 1) = y * y;
-  series.col(kProducts + 2) = z * z;
-  series.col(kProducts + 3) = x * y;
-  series.col(kProducts + 4) = x * z;
-  series.col(kProducts + 5) = y * z;
+  for (Eigen::Index i = 0; i < series.rows(); ++i)
+    series.row(i).segment<6>(kProducts) = products_of(grid.motion.row(i).head<3>());
+  series.middleCols<6>(kShakes) = grid.products - series.middleCols<6>(kProducts);
   for (Eigen::Index i = 0; i < 9; ++i) {
     auto column = series.col(kForceProducts + i);
     column = grid.motion.col(3 + i / 3).cwiseProduct(series.col(kForce + i % 3));
@@ -149,8 +148,8 @@ class Batch {
     study_mean_ = mean_of(study.motion, study.valid);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
     set_gyro_power(problem_);
-    class_.reference = reference_grade(
-        reference_gyro_white_radps_per_sqrt_hz_.value_or(quietest_gyro_white_radps_per_sqrt_hz(problem_)));
+    class_.reference = reference_grade(reference_gyro_white_radps_per_sqrt_hz_.value_or(
+        quietest_gyro_white_radps_per_sqrt_hz(grid.motion.leftCols<3>(), grid.valid)));
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
     problem_.from_middle_s.resize(n);
     for (Eigen::Index w = 0; w < n; ++w) {
@@ -193,8 +192,11 @@ class Batch {
       correction = solve(sums_, deviation);
       if (!rough) learn(deviation);
     }
-    estimate_.sensor.add(correction);
-    estimate_.deviation = std::move(deviation);
+    const ParameterVector sds = covariance_.diagonal().cwiseSqrt();
+    if (!rough) set_pace(correction.cwiseQuotient(sds));
+    estimate_.sensor.add(pace_ * correction);
+    for (std::size_t band = 0; band < deviation.size(); ++band)
+      estimate_.deviation[band] += std::min(1.0, pace_) * (deviation[band] - estimate_.deviation[band]);
     for (std::size_t band = 0; band < sums_.size(); ++band)
       taken_.row(static_cast<Eigen::Index>(band)) =
           numbers_taken(sums_[band], equations_.bands[band], covariance_).transpose();
@@ -202,9 +204,23 @@ class Batch {
       scales_.learn_sizes(estimate_.sensor.x, covariance_);
       scales_.choose_places(estimate_.sensor.x, honest_covariance().per_slope);
     }
-    const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
-    last_share_ = share.head<kGyroBias>().maxCoeff();
+    last_share_ = correction.cwiseAbs().cwiseQuotient(sds).head<kGyroBias>().maxCoeff();
     return !rough && last_share_ < kSettledShare;
+  }
+
+  /// Weights that are learned let steps creep, one as large as the other, or go to and fro.
+  /// @param step  in sd
+  void set_pace(const ParameterVector& step) {
+    const auto now = step.head<kGyroBias>();
+    const auto before = last_step_.head<kGyroBias>();
+    const double along = now.dot(before);
+    const double size = now.norm() * before.norm();
+    if (along < 0.0) {
+      pace_ = std::max(0.5 * pace_, kSlowestPace);
+    } else if (along > kAlike * size && now.norm() > kCreeping * before.norm()) {
+      pace_ = std::min(2.0 * pace_, kFastestPace);
+    }
+    last_step_ = step;
   }
 
   [[nodiscard]] ReferenceNoise reference_noise(const Spectra& study) const {
@@ -343,6 +359,7 @@ class Batch {
   [[nodiscard]] Eigen::Matrix<double, 6, kParameters> of_lasting_priors(const Covariance& covariance) const {
     ParameterVector root = scales_.precision().cwiseSqrt();
     root.segment<kGyroShape - kClockRate>(kClockRate).setZero();
+    root.segment<3>(kShaking).setZero();
     return covariance.topRows<6>() * root.asDiagonal();
   }
 
@@ -489,7 +506,9 @@ class Batch {
   std::vector<BandSums> sums_;  ///< of the last step
   NormalEquations equations_;
   Covariance covariance_;
-  double last_share_ = 0.0;  ///< the newest step's largest, of its sd
+  double last_share_ = 0.0;                              ///< the newest step's largest, of its sd
+  ParameterVector last_step_ = ParameterVector::Zero();  ///< in sd
+  double pace_ = 1.0;                                    ///< what a step is multiplied by
 };
 
 }  // namespace

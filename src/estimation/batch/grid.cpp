@@ -66,14 +66,15 @@ Row6 sample_row(const ImuRecord& record, std::size_t i) {
   return row;
 }
 
-/// Weighted mean of the samples under the kernel, and its derivative (B-2).
+/// Weighted mean of the samples under the kernel, its derivative, and the mean of their products (B-2).
 struct Evaluated {
   Row6 value = Row6::Zero();
   Row6 slope = Row6::Zero();
+  Row6 products = Row6::Zero();
 };
 
 Evaluated evaluate(const ImuRecord& record, double instant, std::size_t first, std::size_t last,
-                   bool with_slope) {
+                   bool as_reference) {
   double weight = 0.0;
   double weight_slope = 0.0;
   Evaluated sum;
@@ -83,18 +84,25 @@ Evaluated evaluate(const ImuRecord& record, double instant, std::size_t first, s
     const double k = kernel().value(x);
     weight += k;
     sum.value += k * row;
-    if (!with_slope) continue;
+    if (!as_reference) continue;
+    sum.products += k * products_of(row.head<3>());
     const double dk = kernel().slope(x);
     weight_slope += dk;
     sum.slope += dk * row;
   }
   sum.value /= weight;
+  sum.products /= weight;
   // Derivative of a quotient, so that a constant has none, however the samples lie.
-  if (with_slope) sum.slope = (sum.slope - weight_slope * sum.value) / weight;
+  if (as_reference) sum.slope = (sum.slope - weight_slope * sum.value) / weight;
   return sum;
 }
 
 }  // namespace
+
+Row6 products_of(const Eigen::RowVector3d& omega_radps) {
+  const auto& v = omega_radps;
+  return {v[0] * v[0], v[1] * v[1], v[2] * v[2], v[0] * v[1], v[0] * v[2], v[1] * v[2]};
+}
 
 double sample_period_s(const ImuRecord& record) {
   std::vector<double> steps(record.size() - 1);
@@ -135,13 +143,14 @@ ImuRecord bridged(const ImuRecord& record, double period_s) {
 
 }  // namespace
 
-Grid make_grid(const ImuRecord& recorded, const std::vector<double>& instants, bool with_omega_dot) {
+Grid make_grid(const ImuRecord& recorded, const std::vector<double>& instants, bool as_reference) {
   const double period_s = sample_period_s(recorded);
   const ImuRecord record = bridged(recorded, period_s);
   const auto n = static_cast<Eigen::Index>(instants.size());
   Grid grid;
   grid.motion.setZero(n, 6);
-  if (with_omega_dot) grid.omega_dot.setZero(n, 3);
+  if (as_reference) grid.omega_dot.setZero(n, 3);
+  if (as_reference) grid.products.setZero(n, 6);
   grid.valid.assign(instants.size(), 0);
   const double longest_step_s = kLossStep_periods * period_s;
   // Where the newest step that is too long lies, seen from each sample.
@@ -159,9 +168,12 @@ Grid make_grid(const ImuRecord& recorded, const std::vector<double>& instants, b
     while (last < record.size() && record.time_s[last] < instant + kKernelHalf_s) ++last;
     const bool inside = first > 0 && last < record.size() && last > first;
     if (!inside || gap_end[last] > record.time_s[first]) continue;
-    const Evaluated at = evaluate(record, instant, first, last, with_omega_dot);
+    const Evaluated at = evaluate(record, instant, first, last, as_reference);
     grid.motion.row(row) = at.value;
-    if (with_omega_dot) grid.omega_dot.row(row) = at.slope.head<3>();
+    if (as_reference) {
+      grid.omega_dot.row(row) = at.slope.head<3>();
+      grid.products.row(row) = at.products;
+    }
     grid.valid[static_cast<std::size_t>(row)] = 1;
   }
   return grid;

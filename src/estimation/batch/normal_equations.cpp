@@ -41,9 +41,13 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
   J.block<3, 3>(0, kPsi) = t.gyro * skew_c(motion.omega);
   J.block<3, 3>(3, kPsi) = t.accel * skew_c(force);
   J.block<3, 3>(3, kLeverArm) = t.accel * motion.arm;
-  J.block<3, 1>(0, kTimeOffset) = derivative(frequency_hz) * gyros(t, motion, frequency_hz);
+  J.block<3, 3>(3, kShaking) = t.accel * motion.shaking;
+  const Vector3c shown = gyros(t, motion, frequency_hz);
+  J.block<3, 1>(0, kTimeOffset) = derivative(frequency_hz) * shown;
+  J.block<3, 1>(0, kDispersion) = dispersed(frequency_hz) * shown;
   const Vector3c felt = accelerometers(t, motion);
   J.block<3, 1>(3, kTimeOffset) = derivative(frequency_hz) * felt;
+  J.block<3, 1>(3, kDispersion + 1) = dispersed(frequency_hz) * felt;
   J.col(kClockRate) = from_middle_s * J.col(kTimeOffset);
   J.block<3, 1>(3, kAccelDelay) = J.block<3, 1>(3, kTimeOffset);
   J.block<3, 3>(3, kAlpha) = accel_shape * skew_c(force_a);

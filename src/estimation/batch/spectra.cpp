@@ -59,12 +59,18 @@ class Transform {
 }  // namespace
 
 WindowPlan plan_windows(const std::vector<char>& valid, double rate_hz, double top_hz) {
-  WindowPlan plan;
-  for (plan.length = kLongestWindow;; plan.length /= 2) {
-    plan.starts = starts_of(valid, plan.length);
-    if (plan.starts.size() >= kFewWindows || plan.length == kShortestWindow) break;
+  for (Eigen::Index length = kLongestWindow;; length /= 2) {
+    WindowPlan plan = plan_windows_of(length, valid, rate_hz, top_hz);
+    if (plan.starts.size() >= kFewWindows || length == kShortestWindow) return plan;
   }
-  plan.frequency_step_hz = rate_hz / static_cast<double>(plan.length);
+}
+
+WindowPlan plan_windows_of(Eigen::Index length, const std::vector<char>& valid, double rate_hz,
+                           double top_hz) {
+  WindowPlan plan;
+  plan.length = length;
+  plan.starts = starts_of(valid, length);
+  plan.frequency_step_hz = rate_hz / static_cast<double>(length);
   plan.n_frequencies = static_cast<Eigen::Index>(top_hz / plan.frequency_step_hz) + 1;
   return plan;
 }

@@ -28,6 +28,10 @@ struct WindowPlan {
 /// @param top_hz   highest frequency that is used
 [[nodiscard]] WindowPlan plan_windows(const std::vector<char>& valid, double rate_hz, double top_hz);
 
+/// Windows of `length` over all stretches of valid instants.
+[[nodiscard]] WindowPlan plan_windows_of(Eigen::Index length, const std::vector<char>& valid, double rate_hz,
+                                         double top_hz);
+
 /// Transforms of all columns of a series in all windows.
 class Spectra {
  public:

@@ -14,6 +14,14 @@ Matrix3c skew_c(const Vector3c& v) {
 
 namespace {
 
+/// w w' - |w|^2 I of the products xx, yy, zz, xy, xz, yz.
+template <typename Products>
+Matrix3c centripetal(const Products& p) {
+  Matrix3c outer;
+  outer << p[0], p[3], p[4], p[3], p[1], p[5], p[4], p[5], p[2];
+  return outer - outer.trace() * Matrix3c::Identity();
+}
+
 /// B-8a: what the turned mount makes of the forces, f x (S (f - f_0)), in b.
 Vector3c of_turned_mount(const Transfer& t, const Motion& motion) {
   const Matrix3c product = motion.force_products * t.compliance_b.transpose();
@@ -29,10 +37,8 @@ Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k) 
   motion.f = row.segment<3>(kForce).transpose();
   // B-6
   motion.arm = skew_c(row.segment<3>(kOmegaDot).transpose());
-  const auto p = row.segment<6>(kProducts);
-  Matrix3c outer;
-  outer << p[0], p[3], p[4], p[3], p[1], p[5], p[4], p[5], p[2];
-  motion.arm += outer - outer.trace() * Matrix3c::Identity();
+  motion.shaking = centripetal(row.segment<6>(kShakes));
+  motion.arm += centripetal(row.segment<6>(kProducts));
   for (Eigen::Index i = 0; i < 3; ++i) motion.force_products.row(i) = row.segment<3>(kForceProducts + 3 * i);
   return motion;
 }
@@ -69,7 +75,9 @@ Transfer::Transfer(const SensorState& sensor, const DeviationVector& deviation)
       gyro_bias(sensor.x.segment<3>(kGyroBias)),
       accel_bias(sensor.x.segment<3>(kAccelBias)),
       fade(sensor.x.segment<3>(kAccelFade)),
-      delay_s(sensor.x[kAccelDelay]) {
+      delay_s(sensor.x[kAccelDelay]),
+      dispersion_s(sensor.x.segment<2>(kDispersion)),
+      shaking_b_m(sensor.x.segment<3>(kShaking)) {
   for (Eigen::Index i = 0; i < 3; ++i) {
     place_b_m[static_cast<std::size_t>(i)] = C.transpose() * sensor.place_s_m(i);
     gyro_deviation.row(i) = deviation.segment<3>(3 * i).transpose();
@@ -85,9 +93,14 @@ double flexure_gain(double frequency_hz) {
 
 complex<double> derivative(double frequency_hz) { return {0.0, 2.0 * std::numbers::pi * frequency_hz}; }
 
+complex<double> dispersed(double frequency_hz) {
+  return flexure_gain(frequency_hz) * derivative(frequency_hz);
+}
+
 // B-8: each at its place, B-8a added
 Vector3c accelerometers(const Transfer& t, const Motion& motion) {
-  const Vector3c middle = motion.force_at(t.arm_b_m) + of_turned_mount(t, motion);
+  const Vector3c middle = motion.force_at(t.arm_b_m) + of_turned_mount(t, motion) +
+                          motion.shaking * t.shaking_b_m.cast<complex<double>>();
   Vector3c felt;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Vector3c there =
@@ -108,14 +121,16 @@ Vector6c predicted(const Transfer& t, const Motion& motion, const Vector3c& stud
   Vector6c y;
   const Vector3c force_s = t.C * motion.force_at(t.arm_b_m);
   // B-7
-  y.head<3>() = gyros(t, motion, frequency_hz) + derivative(frequency_hz) * (t.compliance * force_s) +
-                t.g_sensitivity * study_f + constant * t.gyro_bias;
+  y.head<3>() = gyros(t, motion, frequency_hz) * (1.0 + dispersed(frequency_hz) * t.dispersion_s[0]) +
+                derivative(frequency_hz) * (t.compliance * force_s) + t.g_sensitivity * study_f +
+                constant * t.gyro_bias;
   const Vector3c felt = accelerometers(t, motion);
   // B-8; the other axes' forces by B-8a
-  y.tail<3>() = felt * (1.0 + derivative(frequency_hz) * t.delay_s) +
-                flexure_gain(frequency_hz) *
-                    (t.fade.cast<complex<double>>().cwiseProduct(felt) + t.accel_flexure * felt) +
-                t.accel_deviation * force_s + constant * t.accel_bias;
+  y.tail<3>() =
+      felt * (1.0 + derivative(frequency_hz) * t.delay_s + dispersed(frequency_hz) * t.dispersion_s[1]) +
+      flexure_gain(frequency_hz) *
+          (t.fade.cast<complex<double>>().cwiseProduct(felt) + t.accel_flexure * felt) +
+      t.accel_deviation * force_s + constant * t.accel_bias;
   return y;
 }
 

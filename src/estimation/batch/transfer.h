@@ -27,7 +27,8 @@ enum ReferenceColumn : Eigen::Index {
   kOmegaDot = 6,
   kProducts = 9,        ///< omega_i omega_j: xx, yy, zz, xy, xz, yz
   kForceProducts = 15,  ///< 9: f_i (f_j - its mean), with gravity in f, less its mean; row-major
-  kReferenceColumns = 24,
+  kShakes = 24,         ///< 6: as kProducts, of what of omega the low-pass takes
+  kReferenceColumns = 30,
 };
 
 /// The body's motion in one window at one frequency.
@@ -37,7 +38,8 @@ struct Motion {
   Matrix3c arm;  ///< acceleration of a point of the body per metre of its lever arm: [omega' x] + omega
                  ///< omega' - |omega|^2 (B-6)
 
-  Matrix3c force_products;  ///< f (f - f_0)', with gravity in f; f_0: its mean
+  Matrix3c force_products;              ///< f (f - f_0)', with gravity in f; f_0: its mean
+  Matrix3c shaking = Matrix3c::Zero();  ///< as `arm`, of rates that are faster than the low-pass
 
   [[nodiscard]] Vector3c force_at(const Eigen::Vector3d& lever_arm_m) const {
     return f + arm * lever_arm_m.cast<std::complex<double>>();
@@ -67,12 +69,16 @@ struct Transfer {
   Eigen::Vector3d gyro_bias, accel_bias;
   Eigen::Vector3d fade;
   double delay_s;
+  Eigen::Vector2d dispersion_s;
+  Eigen::Vector3d shaking_b_m;
 
   Transfer(const SensorState& sensor, const DeviationVector& deviation);
 };
 
 /// (f / kFlexure_hz)^2
 [[nodiscard]] double flexure_gain(double frequency_hz);
+/// i w phi: what a dispersion of one second makes of a motion (B-7).
+[[nodiscard]] std::complex<double> dispersed(double frequency_hz);
 /// i w: what a derivative in time is at a frequency.
 [[nodiscard]] std::complex<double> derivative(double frequency_hz);
 

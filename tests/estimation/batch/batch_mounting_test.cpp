@@ -170,6 +170,44 @@ TEST(EstimateMounting, StaysAtTheLeverArmOfQuietAccelerometersFarFromAPerfectRef
   EXPECT_LT(total, 6.0 * kSeeds + 3.3 * std::sqrt(2.0 * 6.0 * kSeeds));
 }
 
+/// Its squares are slow: products of low-passed rates lack them, and took a lever arm for longer than it is.
+TEST(EstimateMounting, IsNotMisledByABodyThatShakesFasterThanTheGridShows) {
+  for (int seed = 0; seed < 3; ++seed) {
+    PairOptions truth = crooked();
+    truth.r_bs_b_m = {0.2, -0.5, 0.9};
+    truth.hop_rate = 0.02;
+    truth.study_accel_white = 1e-3;
+    const auto pair = make_pair(truth, 320 + static_cast<std::uint64_t>(seed));
+    const auto found = estimate_mounting(pair.reference, pair.study);
+    ASSERT_TRUE(found) << found.error().text();
+    const Vector6 error = error_of(*found, truth);
+    for (Eigen::Index i = 0; i < 6; ++i)
+      EXPECT_LT(std::abs(error[i]), 4.0 * std::sqrt(found->covariance(i, i))) << seed << ' ' << i;
+    EXPECT_LT(error.tail<3>().cwiseAbs().maxCoeff(), 0.004) << seed;
+  }
+}
+
+/// A second-order low-pass is later for fast motion than for slow.
+TEST(EstimateMounting, TellsALowPassFromADelay) {
+  for (int seed = 0; seed < 3; ++seed) {
+    PairOptions truth = crooked();
+    truth.road_rate = 5e-3;
+    truth.study_low_pass_hz = 40.0;
+    truth.reference_gyro_white = 2e-5;
+    const auto pair = make_pair(truth, 330 + static_cast<std::uint64_t>(seed));
+    const auto found = estimate_mounting(pair.reference, pair.study);
+    ASSERT_TRUE(found) << found.error().text();
+    const double t_d_s = truth.t_d_s - synthetic::low_pass_delay_s(truth.study_low_pass_hz);
+    EXPECT_NEAR(found->sensor.x[kTimeOffset], t_d_s, 3.3 * found->sd(kTimeOffset)) << seed;
+    EXPECT_LT(found->sd(kTimeOffset), 6e-5) << seed;
+    // Phase of 1 / (1 + i sqrt(2) u - u^2) at u = 5 Hz / 40 Hz, less that of slow motion's delay: 28.9 us at 5 Hz.
+    for (Eigen::Index triad = 0; triad < 2; ++triad)
+      EXPECT_NEAR(found->sensor.x[kDispersion + triad], -28.9e-6, 4.0 * found->sd(kDispersion, triad))
+          << seed << ' ' << triad;
+    EXPECT_LT(found->sd(kDispersion, 1), 8e-6) << seed;
+  }
+}
+
 TEST(EstimateMounting, RefusesAnAxisThatIsNoSensorsByName) {
   for (const bool of_reference : {false, true}) {
     PairOptions truth = crooked();

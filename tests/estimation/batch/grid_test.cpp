@@ -47,6 +47,14 @@ TEST(Grid, TakesAwayWhatTheGridCouldNotShow) {
   EXPECT_LT(grid.motion.col(0).cwiseAbs().maxCoeff(), 5e-3);
 }
 
+TEST(Grid, ShowsTheSquareOfWhatItDoesNotShow) {
+  const Grid grid = make_grid(sine(200.0, 30.0), instants(), true);
+  for (Eigen::Index i = 0; i < grid.products.rows(); ++i) {
+    EXPECT_NEAR(grid.products(i, 0), 0.5, 1e-2);  // omega_x^2
+    EXPECT_NEAR(grid.products(i, 2), 1.0, 1e-6);  // omega_z^2
+  }
+}
+
 TEST(Grid, BridgesTwoLostSamplesAndMarksALongerGap) {
   const ImuRecord whole = sine(100.0, 1.0);
   ImuRecord holed;

@@ -39,11 +39,14 @@ struct Body {
       forces[i] = {options.motion * 0.4 * Vector3d{normal(random), normal(random), normal(random)},
                    6.283185307179586 * f_hz * 1.07, phase(random)};
     }
-    if (options.road_rate == 0.0) return;
-    for (int i = 0; i < 40; ++i) {
-      const Vector3d amplitude{normal(random), normal(random), 0.2 * normal(random)};
-      road.push_back({options.road_rate * amplitude, 6.283185307179586 * (1.03 + 0.2 * i), phase(random)});
-    }
+    const auto add_road = [&](double rate, int lines, double from_hz, double step_hz) {
+      for (int i = 0; i < lines && rate > 0.0; ++i) {
+        const Vector3d amplitude{normal(random), normal(random), 0.2 * normal(random)};
+        road.push_back({rate * amplitude, 6.283185307179586 * (from_hz + step_hz * i), phase(random)});
+      }
+    };
+    add_road(options.road_rate, 40, 1.03, 0.2);
+    add_road(options.hop_rate, 20, 11.03, 0.4);
   }
   [[nodiscard]] Vector3d omega(double t) const { return sum(rates, t, 0) + sum(road, t, 0); }
   [[nodiscard]] Vector3d omega_dot(double t) const { return sum(rates, t, 1) + sum(road, t, 1); }
@@ -82,7 +85,59 @@ Vector3d force_at(const Body& body, double t, const Vector3d& arm) {
   return body.force(t) + body.omega_dot(t).cross(arm) + w.cross(w.cross(arm));
 }
 
+/// What the S-IMU shows without bias and noise: rates, then forces.
+using Shown = Eigen::Matrix<double, 6, 1>;
+Shown shown(const Body& body, const PairOptions& o, double t) {
+  Shown all;
+  all.head<3>() = o.gyro_matrix * o.C_b_s * (body.omega(t) + o.compliance_b * body.force_dot(t));
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Vector3d arm = o.r_bs_b_m + o.C_b_s.transpose() * o.places_s_m.row(axis).transpose();
+    const Vector3d force = force_at(body, t + o.accel_delay_s, arm);
+    const Vector3d turn = o.compliance_b * (body.force(t + o.accel_delay_s) - Vector3d(0.0, 0.0, -9.81));
+    all[3 + axis] = (o.accel_matrix * o.C_b_s * (force + force.cross(turn)))[axis];
+  }
+  return all;
+}
+
+constexpr double kFine_hz = 2000.0;
+double prewarped(double corner_hz) { return std::tan(1.5707963267948966 * 2.0 * corner_hz / kFine_hz); }
+
+/// The same behind a low-pass, at instants that are asked for in order: bilinear transform at kFine_hz, straight lines
+/// between.
+class LowPassed {
+ public:
+  LowPassed(const Body& body, const PairOptions& options, double from_s)
+      : body_(body), options_(options), k_(prewarped(options.study_low_pass_hz)), t_s_(from_s) {
+    in_[0] = in_[1] = in_[2] = out_[0] = out_[1] = out_[2] = shown(body, options, from_s);
+  }
+  Shown at(double t_s) {
+    while (t_s_ < t_s) step();
+    const double late = (t_s_ - t_s) * kFine_hz;
+    return late * out_[1] + (1.0 - late) * out_[0];
+  }
+
+ private:
+  void step() {
+    t_s_ += 1.0 / kFine_hz;
+    in_ = {shown(body_, options_, t_s_), in_[0], in_[1]};
+    const double norm = 1.0 + std::sqrt(2.0) * k_ + k_ * k_;
+    const Shown next = (k_ * k_ * (in_[0] + 2.0 * in_[1] + in_[2]) - 2.0 * (k_ * k_ - 1.0) * out_[0] -
+                        (1.0 - std::sqrt(2.0) * k_ + k_ * k_) * out_[1]) /
+                       norm;
+    out_ = {next, out_[0], out_[1]};
+  }
+
+  const Body& body_;
+  const PairOptions& options_;
+  double k_;
+  double t_s_;
+  std::array<Shown, 3> in_;
+  std::array<Shown, 3> out_;
+};
+
 }  // namespace
+
+double low_pass_delay_s(double corner_hz) { return std::sqrt(2.0) / (2.0 * kFine_hz * prewarped(corner_hz)); }
 
 Pair make_pair(const PairOptions& o, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -100,18 +155,13 @@ Pair make_pair(const PairOptions& o, std::uint64_t seed) {
                        (o.reference_accel_matrix * body.force(t) + reference_accel(random)).cast<float>());
   }
   std::uniform_real_distribution<double> uniform;
+  LowPassed low_passed(body, o, o.t_d_s - 1.0);
   for (int i = 0; i < static_cast<int>(o.duration_s * o.study_rate_hz); ++i) {
     const double own = (i + 0.3) / o.study_rate_hz;
     const double t = own + o.t_d_s + o.clock_rate * (own - 0.5 * o.duration_s);
-    const Vector3d gyro = o.gyro_matrix * o.C_b_s * (body.omega(t) + o.compliance_b * body.force_dot(t)) +
-                          o.gyro_bias + study_gyro(random);
-    Vector3d accel = o.accel_bias + study_accel(random);
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      const Vector3d arm = o.r_bs_b_m + o.C_b_s.transpose() * o.places_s_m.row(axis).transpose();
-      const Vector3d force = force_at(body, t + o.accel_delay_s, arm);
-      const Vector3d turn = o.compliance_b * (body.force(t + o.accel_delay_s) - Vector3d(0.0, 0.0, -9.81));
-      accel[axis] += (o.accel_matrix * o.C_b_s * (force + force.cross(turn)))[axis];
-    }
+    const Shown motion = o.study_low_pass_hz > 0.0 ? low_passed.at(t) : shown(body, o, t);
+    const Vector3d gyro = motion.head<3>() + o.gyro_bias + study_gyro(random);
+    const Vector3d accel = motion.tail<3>() + o.accel_bias + study_accel(random);
     if (uniform(random) < o.lost_share) continue;
     pair.study.add(own, gyro.cast<float>(), accel.cast<float>());
   }

@@ -30,10 +30,12 @@ struct PairOptions {
   Eigen::Matrix3d reference_accel_matrix = Eigen::Matrix3d::Identity();
   double study_gyro_white = 2e-4;
   double study_accel_white = 2e-3;
-  double motion = 1.0;      ///< factor of all rates and forces but gravity
-  double road_rate = 0.0;   ///< an uneven road's part above 1 Hz, rad/s each of forty lines to 9 Hz
-  bool turns = true;        ///< false: the body never turns
-  double lost_share = 0.0;  ///< of the S-IMU's samples, singly
+  double motion = 1.0;             ///< factor of all rates and forces but gravity
+  double road_rate = 0.0;          ///< an uneven road's part above 1 Hz, rad/s each of forty lines to 9 Hz
+  double hop_rate = 0.0;           ///< the axles' hopping, rad/s each of twenty lines from 11 to 19 Hz
+  bool turns = true;               ///< false: the body never turns
+  double lost_share = 0.0;         ///< of the S-IMU's samples, singly
+  double study_low_pass_hz = 0.0;  ///< a second-order Butterworth's corner, of all its axes; zero: none
   /// How far the S-IMU's mount turns under other forces than gravity's, in b, rad per m/s^2.
   Eigen::Matrix3d compliance_b = Eigen::Matrix3d::Zero();
 };
@@ -42,6 +44,9 @@ struct Pair {
   imuscope::batch::ImuRecord reference;
   imuscope::batch::ImuRecord study;
 };
+
+/// By how much that low-pass is late for slow motion, s.
+[[nodiscard]] double low_pass_delay_s(double corner_hz);
 
 [[nodiscard]] Pair make_pair(const PairOptions& options, std::uint64_t seed);
 
