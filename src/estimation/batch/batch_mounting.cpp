@@ -27,6 +27,8 @@ constexpr double kTop_hz = 8.0;
 /// A band's first sd of deviation, before it is learned.
 constexpr double kFirstDeviation = 0.01;
 constexpr double kLeastDeviation = 1e-5;
+/// Of a band that deviates by as much the S-IMU tells nothing; more would be the reference's noise.
+constexpr double kMostDeviation = 0.3;
 /// Rounds of learning the deviations' sizes in each step.
 constexpr int kLearningRounds = 10;
 /// Deviations that a drive must tell at least, for their size to be learned from it.
@@ -194,6 +196,9 @@ class Batch {
     }
     const ParameterVector sds = covariance_.diagonal().cwiseSqrt();
     if (!rough) set_pace(correction.cwiseQuotient(sds));
+    // Where the step leads, whatever the pace: what is learned of sizes and places is true there.
+    SensorState led_to = estimate_.sensor;
+    led_to.add(correction);
     estimate_.sensor.add(pace_ * correction);
     for (std::size_t band = 0; band < deviation.size(); ++band)
       estimate_.deviation[band] += std::min(1.0, pace_) * (deviation[band] - estimate_.deviation[band]);
@@ -201,8 +206,8 @@ class Batch {
       taken_.row(static_cast<Eigen::Index>(band)) =
           numbers_taken(sums_[band], equations_.bands[band], covariance_).transpose();
     if (!rough) {
-      scales_.learn_sizes(estimate_.sensor.x, covariance_);
-      scales_.choose_places(estimate_.sensor.x, honest_covariance().per_slope);
+      scales_.learn_sizes(led_to.x, covariance_);
+      scales_.choose_places(led_to.x, honest_covariance().per_slope);
     }
     last_share_ = correction.cwiseAbs().cwiseQuotient(sds).head<kGyroBias>().maxCoeff();
     return !rough && last_share_ < kSettledShare;
@@ -321,7 +326,7 @@ class Batch {
         const double of_all = told.col(triad).segment(first, count).sum();
         const double sum = square.col(triad).segment(first, count).sum();
         estimate_.deviation_sd(band, triad) =
-            std::max(kLeastDeviation, std::sqrt(sum / std::max(of_all, kLeastTold)));
+            std::clamp(std::sqrt(sum / std::max(of_all, kLeastTold)), kLeastDeviation, kMostDeviation);
       }
     }
   }
