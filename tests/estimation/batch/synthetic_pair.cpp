@@ -46,7 +46,8 @@ struct Body {
       }
     };
     add_road(options.road_rate, 40, 1.03, 0.2);
-    add_road(options.hop_rate, 20, 11.03, 0.4);
+    for (int i = 0; i < 60 && options.hop_rate > 0.0; ++i)
+      add_road(options.hop_rate, 1, 5.0 + 0.15 * (i + phase(random) / 6.28), 0.0);
   }
   [[nodiscard]] Vector3d omega(double t) const { return sum(rates, t, 0) + sum(road, t, 0); }
   [[nodiscard]] Vector3d omega_dot(double t) const { return sum(rates, t, 1) + sum(road, t, 1); }

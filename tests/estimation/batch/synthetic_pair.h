@@ -32,7 +32,7 @@ struct PairOptions {
   double study_accel_white = 2e-3;
   double motion = 1.0;             ///< factor of all rates and forces but gravity
   double road_rate = 0.0;          ///< an uneven road's part above 1 Hz, rad/s each of forty lines to 9 Hz
-  double hop_rate = 0.0;           ///< the axles' hopping, rad/s each of twenty lines from 11 to 19 Hz
+  double hop_rate = 0.0;           ///< the axles' hopping, rad/s each of sixty lines from 5 to 14 Hz
   bool turns = true;               ///< false: the body never turns
   double lost_share = 0.0;         ///< of the S-IMU's samples, singly
   double study_low_pass_hz = 0.0;  ///< a second-order Butterworth's corner, of all its axes; zero: none
