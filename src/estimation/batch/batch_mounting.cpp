@@ -45,9 +45,10 @@ constexpr int kMostIterations = 25;
 constexpr int kRoughIterations = 2;
 /// A step of less than this share of the sd changes nothing that is published.
 constexpr double kSettledShare = 0.1;
-/// Steps that are so alike (cosine) and become no smaller creep.
+/// Steps that are so alike (cosine) and as large as this share of the one before creep.
 constexpr double kAlike = 0.8;
 constexpr double kCreeping = 0.7;
+/// B-14a: bounds of what a step is multiplied by.
 constexpr double kFastestPace = 4.0;
 constexpr double kSlowestPace = 0.25;
 /// After the last step one of more than this is no approach to anything.
@@ -213,7 +214,7 @@ class Batch {
     return !rough && last_share_ < kSettledShare;
   }
 
-  /// Weights that are learned let steps creep, one as large as the other, or go to and fro.
+  /// B-14a: weights that are learned let steps creep, one as large as the other, or go to and fro.
   /// @param step  in sd
   void set_pace(const ParameterVector& step) {
     const auto now = step.head<kGyroBias>();
@@ -370,10 +371,12 @@ class Batch {
 
   /// B-22: what would go if the sensor's imperfections were known is theirs.
   [[nodiscard]] static LimitShares limit_shares(const Covariance& own, const Covariance& of_reference) {
-    constexpr Eigen::Index kImperfections = kParameters - kGyroShape;
-    const Eigen::Matrix<double, 6, kImperfections> cross = own.topRightCorner<6, kImperfections>();
+    // Without the shaking, which is the drive's.
+    constexpr Eigen::Index kImperfections = kShaking - kGyroShape;
+    const Eigen::Matrix<double, 6, kImperfections> cross = own.block<6, kImperfections>(0, kGyroShape);
     const Eigen::Matrix<double, 6, 6> of_sensor =
-        cross * own.bottomRightCorner<kImperfections, kImperfections>().ldlt().solve(cross.transpose());
+        cross *
+        own.block<kImperfections, kImperfections>(kGyroShape, kGyroShape).ldlt().solve(cross.transpose());
     const Eigen::Array<double, 6, 1> all =
         own.diagonal().head<6>().array() + of_reference.diagonal().head<6>().array();
     LimitShares shares;

@@ -35,7 +35,7 @@ enum Parameter : Eigen::Index {
       57,  ///< 6: what each shows of forces along the two others' axes there; a mount that gives way
   kCompliance = 63,  ///< 9: row-major, rad per m/s^2; how far the mount turns under forces
   kDispersion =
-      72,  ///< 2: by how much later the gyros, the accelerometers show a motion of kFlexure_hz than a slow one, s
+      72,  ///< 2: of gyros, of accelerometers; growth of their t_d from slow motion to kFlexure_hz, s
   kShaking =
       74,  ///< 3: as kLeverArm, for rates that are faster than the low-pass; a body's is its lever arm, m
   kParameters = 77,
@@ -72,7 +72,7 @@ struct SensorClass {
   double accel_flexure_sd = 0.003;
   /// A mount with a resonance of 30 Hz gives way by 1 / (2 pi 30 Hz)^2 = 28 um per m/s^2, here over a metre.
   double compliance_sd = 2.8e-5;
-  /// A low-pass of 40 Hz is later by this at 5 Hz than for slow motion if it is of second order, earlier if of first.
+  /// A second-order low-pass of 40 Hz is later by this at 5 Hz than for slow motion, one of first order earlier by less.
   double dispersion_sd_s = 3e-5;
   double shaking_sd_m = 1.0;  ///< and what accelerometers make of fast vibration
   /// What the reference's own axes may be off by: scale; each axis, of a departure that two of them share; its

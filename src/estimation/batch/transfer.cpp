@@ -37,7 +37,7 @@ Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k) 
   motion.f = row.segment<3>(kForce).transpose();
   // B-6
   motion.arm = skew_c(row.segment<3>(kOmegaDot).transpose());
-  motion.shaking = centripetal(row.segment<6>(kShakes));
+  motion.shaking = centripetal(row.segment<6>(kShakes));  // B-6a
   motion.arm += centripetal(row.segment<6>(kProducts));
   for (Eigen::Index i = 0; i < 3; ++i) motion.force_products.row(i) = row.segment<3>(kForceProducts + 3 * i);
   return motion;
