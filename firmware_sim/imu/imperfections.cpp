@@ -11,6 +11,9 @@ namespace imusim {
 namespace {
 
 constexpr double kMps2PerG = 9.80665;
+// A low-pass of resistors and capacitors on the chip.
+constexpr double kLowPassSd = 0.1;
+constexpr double kLowPassMost = 0.3;
 
 Eigen::Matrix3d draw9(Random& random, double sd) {
   Eigen::Matrix3d drawn;
@@ -39,6 +42,7 @@ Imperfections study_imperfections(WorldKind world) {
   mtx.g_sensitivity_sd_s_per_m = 0.05 * kRadPerDeg / kMps2PerG;
   mtx.delay_apart_sd_s = 1e-3;
   mtx.low_pass_hz = 40.0;
+  mtx.low_pass_sd = kLowPassSd;
   mtx.own_vibration = 0.5;
   return mtx;
 }
@@ -49,12 +53,14 @@ Imperfections reference_imperfections(WorldKind world, const ReferenceClass& of)
     double gyro_white_deg_per_sqrt_h;  ///< below
     double axes_rad;
     double scale;
+    double low_pass_hz;
   };
   // Navigation grade, fibre-optic AHRS, tactical MEMS, and whatever is worse.
-  constexpr std::array<Grade, 4> kGrades{{{0.01, 300e-6, 300e-6},
-                                          {0.05, 0.02 * kRadPerDeg, 500e-6},
-                                          {0.2, 0.05 * kRadPerDeg, 1e-3},
-                                          {std::numeric_limits<double>::infinity(), 0.1 * kRadPerDeg, 5e-3}}};
+  constexpr std::array<Grade, 4> kGrades{
+      {{0.01, 300e-6, 300e-6, 80.0},
+       {0.05, 0.02 * kRadPerDeg, 500e-6, 80.0},
+       {0.2, 0.05 * kRadPerDeg, 1e-3, 80.0},
+       {std::numeric_limits<double>::infinity(), 0.1 * kRadPerDeg, 5e-3, 40.0}}};
   constexpr double kPerSqrtHour = kRadPerDeg / 60.0;
   const auto& grade = *std::find_if(kGrades.begin(), kGrades.end(), [&](const Grade& g) {
     return of.gyro_white_radps_per_sqrt_hz < g.gyro_white_deg_per_sqrt_h * kPerSqrtHour;
@@ -63,6 +69,8 @@ Imperfections reference_imperfections(WorldKind world, const ReferenceClass& of)
   reference.non_orthogonality_sd_rad = grade.axes_rad;
   reference.triads_apart_sd_rad = grade.axes_rad;
   reference.scale_sd = grade.scale;
+  reference.low_pass_hz = grade.low_pass_hz;
+  reference.low_pass_sd = kLowPassSd;
   reference.own_vibration = 0.25;
   return reference;
 }
@@ -71,7 +79,9 @@ void draw_imperfections(const Imperfections& imperfections, Random& random, ImuE
   const auto draw_triad = [&](TriadErrors& triad) {
     triad.misalignment += leaning(draw3(random, imperfections.non_orthogonality_sd_rad));
     triad.scale += draw3(random, imperfections.scale_sd);
-    triad.low_pass_hz = std::min(triad.low_pass_hz, imperfections.low_pass_hz);
+    // Both ends of what a part may show: no draw makes another sensor of it.
+    const double share = std::clamp(imperfections.low_pass_sd * random.normal(), -kLowPassMost, kLowPassMost);
+    triad.low_pass_hz = std::min(triad.low_pass_hz, imperfections.low_pass_hz * (1.0 + share));
   };
   draw_triad(errors.gyro);
   draw_triad(errors.accel);

@@ -16,8 +16,8 @@ namespace imusim {
 /// Which errors there are at all.
 enum class WorldKind : std::uint8_t {
   kIdeal,  ///< rigid, orthogonal, instantaneous sensors: bias, scale and noise alone
-  kHarsh,  ///< all that is drawn here besides, an engine that shakes the vehicle, and a reference that has
-           ///< scale and misalignment
+  kHarsh,  ///< all that is drawn here besides, an engine and a rough road that shake the vehicle, and a
+           ///< reference that has scale, misalignment and a low-pass of its own
 };
 
 /// Standard deviations of what is drawn, and what all units of a class share.
@@ -30,14 +30,15 @@ struct Imperfections {
   double g_sensitivity_sd_s_per_m = 0.0;  ///< each element, rad/s per m/s^2
   double scale_sd = 0.0;                  ///< on top of the scale that the class has already
   double delay_apart_sd_s = 0.0;          ///< accelerometers later than gyros
-  double low_pass_hz = std::numeric_limits<double>::infinity();  ///< of both triads
+  double low_pass_hz = std::numeric_limits<double>::infinity();  ///< of both triads, each with
+  double low_pass_sd = 0.0;                                      ///< a corner of its own, off by this share
   double own_vibration = 0.0;  ///< what its mount adds, as a share of the vehicle's vibration
 };
 
-/// An MTx class sensor: 0.1 deg, 2 cm, 0.05 deg/s/g, 1 ms, 40 Hz, half of the vehicle's vibration.
+/// An MTx class sensor: 0.1 deg, 2 cm, 0.05 deg/s/g, 1 ms, 40 Hz (4 Hz), half of the vehicle's vibration.
 Imperfections study_imperfections(WorldKind world);
-/// The R-IMU: scale and misalignment as makers of its class of gyros state them, a quarter of the vehicle's
-/// vibration.
+/// The R-IMU: scale, misalignment and bandwidth as makers of its class of gyros state them, a quarter of the
+/// vehicle's vibration.
 Imperfections reference_imperfections(WorldKind world, const ReferenceClass& of);
 
 /// Adds what is drawn to a sensor's errors. The gyro triad's departure from orthogonality is symmetric: its

@@ -20,13 +20,25 @@ std::array<NoiseSource, 3> noise_sources(const TriadErrors& errors, RegimeSwitch
   return {axis(0), axis(1), axis(2)};
 }
 
-/// First-order low-pass over one step, exact for an input that runs straight from `before` to `now`.
-Eigen::Vector3d low_passed(const Eigen::Vector3d& output, const Eigen::Vector3d& before,
-                           const Eigen::Vector3d& now, double step_s, double corner_hz) {
-  if (!std::isfinite(corner_hz)) return now;
-  const double tau_s = 1.0 / (2.0 * std::numbers::pi * corner_hz);
-  const Eigen::Vector3d lag = (now - before) * (tau_s / step_s);
-  return now - lag + (output - before + lag) * std::exp(-step_s / tau_s);
+/// Butterworth low-pass of second order over one step, exact for an input that runs straight from `before` to
+/// `now`: y" + 2 a y' + 2 a^2 (y - u) = 0 with a = omega_c / sqrt(2) follows the line by 1 / a, and what is
+/// left dies away as exp(-a t), turning with a t.
+void low_pass(Eigen::Vector3d& output, Eigen::Vector3d& slope_per_s, const Eigen::Vector3d& before,
+              const Eigen::Vector3d& now, double step_s, double corner_hz) {
+  if (!std::isfinite(corner_hz)) {
+    output = now;
+    return;
+  }
+  const double a_per_s = std::numbers::sqrt2 * std::numbers::pi * corner_hz;
+  const Eigen::Vector3d line_per_s = (now - before) / step_s;
+  const Eigen::Vector3d behind = line_per_s / a_per_s;
+  const Eigen::Vector3d left = output - (before - behind);
+  const Eigen::Vector3d left_per_s = slope_per_s - line_per_s;
+  const double decay = std::exp(-a_per_s * step_s);
+  const double cosine = decay * std::cos(a_per_s * step_s);
+  const double sine = decay * std::sin(a_per_s * step_s);
+  output = now - behind + cosine * left + sine * (left_per_s / a_per_s + left);
+  slope_per_s = line_per_s + cosine * left_per_s - sine * (left_per_s + 2.0 * a_per_s * left);
 }
 
 Eigen::Vector3d clipped_and_quantised(const Eigen::Vector3d& value, const TriadErrors& errors) {
@@ -69,7 +81,7 @@ Eigen::Matrix3d triad_frame(const Eigen::Matrix3d& triad) {
 }
 
 double slow_delay_s(const TriadErrors& errors) {
-  return errors.delay_s + 1.0 / (2.0 * std::numbers::pi * errors.low_pass_hz);
+  return errors.delay_s + 1.0 / (std::numbers::sqrt2 * std::numbers::pi * errors.low_pass_hz);
 }
 
 double Temperature::at(double t_s) const {
@@ -132,6 +144,7 @@ IdealReading ImuModel::through_low_pass(const IdealReading& now, double t_s) {
   if (!std::isfinite(gyro_hz) && !std::isfinite(accel_hz)) return now;
   if (!has_last_) {
     last_input_ = filtered_ = now;
+    filtered_slope_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
     return now;
   }
   const double span_s = t_s - last_t_s_;
@@ -139,9 +152,9 @@ IdealReading ImuModel::through_low_pass(const IdealReading& now, double t_s) {
   const double step_s = span_s / steps;
   for (int k = 1; k <= steps; ++k) {
     const IdealReading input = k == steps ? now : input_at(last_t_s_ + k * step_s);
-    filtered_.omega_radps =
-        low_passed(filtered_.omega_radps, last_input_.omega_radps, input.omega_radps, step_s, gyro_hz);
-    filtered_.f_mps2 = low_passed(filtered_.f_mps2, last_input_.f_mps2, input.f_mps2, step_s, accel_hz);
+    low_pass(filtered_.omega_radps, filtered_slope_.omega_radps, last_input_.omega_radps, input.omega_radps,
+             step_s, gyro_hz);
+    low_pass(filtered_.f_mps2, filtered_slope_.f_mps2, last_input_.f_mps2, input.f_mps2, step_s, accel_hz);
     last_input_ = input;
   }
   return filtered_;

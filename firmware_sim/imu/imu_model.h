@@ -29,15 +29,16 @@ struct Mounting {
 /// Errors of three axes of one kind, in rad/s (gyro) or m/s^2 (accelerometer).
 struct TriadErrors {
   std::array<RegimeNoise, 3> noise;
-  Eigen::Vector3d bias = Eigen::Vector3d::Zero();                ///< turn-on bias
-  Eigen::Vector3d scale = Eigen::Vector3d::Zero();               ///< relative; 0.001 reads 0.1 % too much
-  Eigen::Matrix3d misalignment = Eigen::Matrix3d::Zero();        ///< cross-coupling, rad; diagonal zero
-  Eigen::Matrix3d g_sensitivity = Eigen::Matrix3d::Zero();       ///< gyro only: rad/s per m/s^2
-  Eigen::Matrix3d C_s_triad = Eigen::Matrix3d::Identity();       ///< rotates s to the triad's own axes
-  double delay_s = 0.0;                                          ///< a reading shows what was this long ago
-  double quantisation = 0.0;                                     ///< step; 0 for none
-  double range = std::numeric_limits<double>::infinity();        ///< readings end at +-range
-  double low_pass_hz = std::numeric_limits<double>::infinity();  ///< corner of the first-order low-pass
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();           ///< turn-on bias
+  Eigen::Vector3d scale = Eigen::Vector3d::Zero();          ///< relative; 0.001 reads 0.1 % too much
+  Eigen::Matrix3d misalignment = Eigen::Matrix3d::Zero();   ///< cross-coupling, rad; diagonal zero
+  Eigen::Matrix3d g_sensitivity = Eigen::Matrix3d::Zero();  ///< gyro only: rad/s per m/s^2
+  Eigen::Matrix3d C_s_triad = Eigen::Matrix3d::Identity();  ///< rotates s to the triad's own axes
+  double delay_s = 0.0;                                     ///< a reading shows what was this long ago
+  double quantisation = 0.0;                                ///< step; 0 for none
+  double range = std::numeric_limits<double>::infinity();   ///< readings end at +-range
+  /// Corner of the low-pass, a Butterworth of second order: it is later for fast motion than for slow.
+  double low_pass_hz = std::numeric_limits<double>::infinity();
 };
 
 /// Matrix of a triad: what it makes of a constant rate or force in s.
@@ -130,6 +131,7 @@ class ImuModel {
   double last_t_s_ = 0.0;
   IdealReading last_input_{};
   IdealReading filtered_{};
+  IdealReading filtered_slope_{};  ///< per second
 };
 
 }  // namespace imusim

@@ -100,6 +100,7 @@ json study_json(const World& world, const SImuTruth& study) {
   imu["q_b_s"] = {sign * q.w(), sign * q.x(), sign * q.y(), sign * q.z()};
   imu["r_bs_b_m"] = numbers_of(study.mounting.r_bs_b_m);
   imu["t_d_s"] = true_time_offset_s(world, study);
+  imu["accel_t_d_s"] = true_accel_time_offset_s(world, study);
   imu["stream_latency_s"] = study.latency_s;
   imu["reference_stream_latency_s"] = world.reference_latency_s();
   imu["clock_skew_ppm"] = study.clock_skew_ppm;

@@ -59,7 +59,9 @@ ImuErrors errors_of(const SImuSimulation& study, RegimeSwitch regime_switch, Ran
 
 std::shared_ptr<const Motion> motion_of(const Configuration& configuration) {
   Scenario scenario = configuration.scenario;
-  scenario.engine_runs = configuration.world == WorldKind::kHarsh;
+  const bool harsh = configuration.world == WorldKind::kHarsh;
+  scenario.engine_runs = harsh;
+  scenario.rough_road_to_hz = harsh ? kWheelHop_hz : 0.0;
   return std::make_shared<Motion>(scenario);
 }
 

@@ -134,9 +134,17 @@ Outcome<void> check_faults(World& world);
 
 /// The instant on the R-IMU's time scale that an S-IMU's sample shows is its stamp plus this, where both
 /// stamps are the host times of the first bit of a message: z_S(t) = h(R at t + t_d). For a motion that is
-/// slow beside the low-pass of the S-IMU's gyros.
+/// slow beside the low-passes of both gyro triads.
 inline double true_time_offset_s(const World& world, const SImuTruth& study) {
-  return world.reference_latency_s() - study.latency_s - slow_delay_s(study.errors.gyro);
+  return world.reference_latency_s() + slow_delay_s(world.reference().errors.gyro) - study.latency_s -
+         slow_delay_s(study.errors.gyro);
+}
+
+/// The same of the accelerometers, less that of the gyros.
+inline double true_accel_time_offset_s(const World& world, const SImuTruth& study) {
+  const ImuErrors& reference = world.reference().errors;
+  return slow_delay_s(reference.accel) - slow_delay_s(reference.gyro) -
+         (slow_delay_s(study.errors.accel) - slow_delay_s(study.errors.gyro));
 }
 
 }  // namespace imusim

@@ -16,6 +16,8 @@ constexpr double kPi = std::numbers::pi;
 // Time grids: the drive is integrated on the fine one, the splines run through the coarse one.
 constexpr double kFineStep_s = 0.005;
 constexpr std::size_t kFinePerNode = 10;
+// What shakes up to 15 Hz asks for nodes at 100 Hz.
+constexpr std::size_t kFinePerNodeOfRoughRoad = 2;
 
 // Stop-and-go cycles, all uniform draws.
 constexpr double kTopSpeedLow_mps = 8.0;
@@ -69,7 +71,23 @@ constexpr double kRoughHeave_mps = 0.045;  // vertical velocity
 constexpr double kHeaveSkirtLow_hz = 0.1;
 constexpr double kHeaveSkirtHigh_hz = 3.4;
 
+// A rough road: rates of roll and pitch, and vertical force, are as strong at every frequency; up to where wheels
+// hop they have these standard deviations at the reference speed. A radio-controlled car on a field shows 2 deg/s in
+// each of the bands 3 to 6, 6 to 10 and 10 to 15 Hz, a passenger car in town a fifth of it.
+constexpr double kShakeLow_hz = 1.5;
+constexpr double kShakeRate_radps = 3.0 * kRadPerDeg;
+constexpr double kShakeForce_mps2 = 0.5;
+
+/// Sd of the integral over time of what has an sd of one up to where wheels hop, and goes to `to_hz`.
+double shake_integral_s(double to_hz) {
+  if (to_hz <= kShakeLow_hz) return 0.0;
+  return std::sqrt((1.0 / kShakeLow_hz - 1.0 / to_hz) / (kWheelHop_hz - kShakeLow_hz)) / (2.0 * kPi);
+}
+
 double same_everywhere(double /*frequency_hz*/) { return 1.0; }
+
+/// Power of the integral of what has the same power at every frequency.
+double integrated(double frequency_hz) { return 1.0 / (frequency_hz * frequency_hz); }
 
 /// Power of second-order low- and high-pass filtered white noise with the roughness band's corners.
 double heave_power(double frequency_hz) {
@@ -120,6 +138,10 @@ struct Grid {
     return std::min(nearest, fine_points - 1);
   }
 };
+
+std::size_t fine_per_node(const Scenario& scenario) {
+  return scenario.rough_road_to_hz > 0.0 ? kFinePerNodeOfRoughRoad : kFinePerNode;
+}
 
 Grid grid_for(double duration_s) {
   // A whole number of nodes, and a few beyond the end, where the vehicle stands.
@@ -254,9 +276,19 @@ DriveNodes make_drive(const Scenario& scenario) {
   const SmoothNoise rough_roll(rough, kRoughnessLow_hz, kRoughnessHigh_hz);
   const SmoothNoise rough_pitch(rough, kRoughnessLow_hz, kRoughnessHigh_hz);
   const SmoothNoise rough_heave(rough, kHeaveSkirtLow_hz, kHeaveSkirtHigh_hz, heave_power);
+  Random shake(scenario.seed, "rough road");
+  const double shake_to_hz = std::max(kShakeLow_hz, scenario.rough_road_to_hz);
+  const SmoothNoise shake_roll(shake, kShakeLow_hz, shake_to_hz, integrated);
+  const SmoothNoise shake_pitch(shake, kShakeLow_hz, shake_to_hz, integrated);
+  const SmoothNoise shake_heave(shake, kShakeLow_hz, shake_to_hz, integrated);
+  const double shake_s = shake_integral_s(scenario.rough_road_to_hz);
+  const auto shaken = [&](const SmoothNoise& noise, double t_s) {
+    return shake_s > 0.0 ? shake_s * noise.at(t_s) : 0.0;
+  };
+  const std::size_t per_node = fine_per_node(scenario);
 
   DriveNodes nodes;
-  nodes.step_s = kFineStep_s * kFinePerNode;
+  nodes.step_s = kFineStep_s * static_cast<double>(per_node);
   nodes.moving = moving_spans(speed);
   double distance = 0.0;
   double heading = Random(scenario.seed, "start heading").uniform(0.0, 2.0 * kPi);
@@ -265,7 +297,7 @@ DriveNodes make_drive(const Scenario& scenario) {
   double height = scenario.start.height_m;
   for (std::size_t i = 0; i < grid.fine_points; ++i) {
     const double grade = kGradeRms_rad * grade_by_m.at(distance);
-    if (i % kFinePerNode == 0) {
+    if (i % per_node == 0) {
       const double t_s = static_cast<double>(i) * kFineStep_s;
       const bool inside = i > 0 && i + 1 < grid.fine_points;
       const double acceleration = inside ? (speed[i + 1] - speed[i - 1]) / (2.0 * kFineStep_s) : 0.0;
@@ -276,9 +308,11 @@ DriveNodes make_drive(const Scenario& scenario) {
       // The body leans out of a turn and squats when it accelerates.
       nodes.roll_rad.push_back(kBankRms_rad * bank_by_m.at(distance) -
                                kBodyRoll_rad_per_mps2 * speed[i] * yaw_rate[i] +
-                               roughness * kRoughRoll_rad * rough_roll.at(t_s));
+                               roughness * kRoughRoll_rad * rough_roll.at(t_s) +
+                               roughness * kShakeRate_radps * shaken(shake_roll, t_s));
       nodes.pitch_rad.push_back(grade + kBodyPitch_rad_per_mps2 * acceleration +
-                                roughness * kRoughPitch_rad * rough_pitch.at(t_s));
+                                roughness * kRoughPitch_rad * rough_pitch.at(t_s) +
+                                roughness * kShakeRate_radps * shaken(shake_pitch, t_s));
       nodes.heading_rad.push_back(heading);
     }
     if (i + 1 == grid.fine_points) break;
@@ -291,8 +325,10 @@ DriveNodes make_drive(const Scenario& scenario) {
     latitude_offset += step_m * std::cos(grade) * std::cos(middle) / (radii.meridian_m + height);
     longitude_offset +=
         step_m * std::cos(grade) * std::sin(middle) / ((radii.transverse_m + height) * std::cos(latitude));
-    const double heave_mps = kRoughHeave_mps * (speed[i] / kRoughnessSpeed_mps) *
-                             rough_heave.at((static_cast<double>(i) + 0.5) * kFineStep_s);
+    const double middle_s = (static_cast<double>(i) + 0.5) * kFineStep_s;
+    const double roughness = speed[i] / kRoughnessSpeed_mps;
+    const double heave_mps = kRoughHeave_mps * roughness * rough_heave.at(middle_s) +
+                             kShakeForce_mps2 * roughness * shaken(shake_heave, middle_s);
     height += step_m * std::sin(grade) + heave_mps * kFineStep_s;
     heading += turn;
     distance += step_m;

@@ -11,6 +11,9 @@
 
 namespace imusim {
 
+/// Where wheels hop.
+inline constexpr double kWheelHop_hz = 15.0;
+
 /// What the vehicle does.
 enum class ScenarioKind {
   kDrive,         ///< standstill, stop-and-go drive, standstill
@@ -25,6 +28,8 @@ struct Scenario {
   std::optional<double> initial_standstill_s;
   std::uint64_t seed = 1;
   bool engine_runs = false;  ///< the vehicle vibrates as a rigid body, besides its drive
+  /// Up to here the body rolls, pitches and heaves on a rough road, as a small car's does; 0: no such road.
+  double rough_road_to_hz = 0.0;
   GeodeticPosition start = {46.52 * 3.14159265358979323846 / 180.0, 6.57 * 3.14159265358979323846 / 180.0,
                             420.0};
 };

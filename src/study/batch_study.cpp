@@ -452,6 +452,7 @@ nlohmann::json batch_json(const batch::BatchMounting& mounting) {
       {"flexure_at_5_hz", matrix_of(sensor.flexure())},
       {"mount_turn_rad_per_mps2", matrix_of(sensor.compliance())},
       {"t_d_growth_at_5_hz_s", {sensor.x[batch::kDispersion], sensor.x[batch::kDispersion + 1]}},
+      {"reference_accel_t_d_s", sensor.x[batch::kReferenceAccelDelay]},
       {"share_of_sensor_psi_r", shares_json(mounting.limits.sensor)},
       {"share_of_reference_psi_r", shares_json(mounting.limits.reference)},
       {"shared_psi_r", estimate_of(mounting).shared_psi_r},

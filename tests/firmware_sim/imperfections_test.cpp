@@ -96,7 +96,7 @@ TEST(Imperfections, ALowPassAndADelayTogetherAreBehindASlowMotionByTheirSum) {
   ImuErrors errors;
   errors.accel.delay_s = 0.001;
   errors.accel.low_pass_hz = errors.gyro.low_pass_hz = 40.0;
-  EXPECT_NEAR(slow_delay_s(errors.accel), 0.001 + 1.0 / (80.0 * std::numbers::pi), 1e-15);
+  EXPECT_NEAR(slow_delay_s(errors.accel), 0.001 + std::numbers::sqrt2 / (80.0 * std::numbers::pi), 1e-15);
   ImuModel model(quiet(), turned(), errors, 1, "late");
   double gyro2 = 0.0;
   double accel2 = 0.0;
@@ -182,6 +182,7 @@ struct MeanSquares {
   double place = 0.0;
   double g_sensitivity = 0.0;
   double delay = 0.0;
+  double low_pass = 0.0;
 };
 
 TEST(Imperfections, HaveTheSizesOfADataSheet) {
@@ -204,7 +205,11 @@ TEST(Imperfections, HaveTheSizesOfADataSheet) {
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(gyro, Eigen::ComputeFullU | Eigen::ComputeFullV);
     EXPECT_LT((svd.matrixU() * svd.matrixV().transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
     EXPECT_LT(errors.accel_places_s_m.rowwise().mean().norm(), 1e-15);
-    EXPECT_EQ(errors.gyro.low_pass_hz, 40.0);
+    for (const double corner_hz : {errors.gyro.low_pass_hz, errors.accel.low_pass_hz})
+      sum.low_pass += std::pow(corner_hz - 40.0, 2) / (2 * kUnits);
+    EXPECT_NE(errors.gyro.low_pass_hz, errors.accel.low_pass_hz);
+    EXPECT_GE(errors.gyro.low_pass_hz, 28.0);
+    EXPECT_LE(errors.gyro.low_pass_hz, 52.0);
   }
   const auto expect_sd = [](double mean_square, double sd, int degrees) {
     EXPECT_NEAR(mean_square / (sd * sd), 1.0, 5.0 * std::sqrt(2.0 / degrees));
@@ -214,6 +219,7 @@ TEST(Imperfections, HaveTheSizesOfADataSheet) {
   expect_sd(sum.place, 0.02 * std::sqrt(2.0 / 3.0), 6 * kUnits);  // centred: two of three are free
   expect_sd(sum.g_sensitivity, 0.05 * kRadPerDeg / 9.80665, 9 * kUnits);
   expect_sd(sum.delay, 1e-3, kUnits);
+  expect_sd(sum.low_pass, 4.0, 2 * kUnits);
 }
 
 TEST(Imperfections, TheIdealWorldHasNone) {
@@ -226,6 +232,7 @@ TEST(Imperfections, TheIdealWorldHasNone) {
   EXPECT_EQ(errors.gyro.g_sensitivity, before.gyro.g_sensitivity);
   EXPECT_TRUE(errors.accel_places_s_m.isZero(0.0));
   EXPECT_EQ(slow_delay_s(errors.accel), 0.0);
+  EXPECT_FALSE(std::isfinite(errors.gyro.low_pass_hz));
   EXPECT_EQ(errors.own_vibration, 0.0);
 }
 
@@ -233,19 +240,22 @@ TEST(Imperfections, AReferenceIsAsStraightAsItsGyrosAreQuiet) {
   constexpr int kUnits = 3000;
   constexpr std::array<double, kReferenceClasses> kAxes_mrad{0.3, 0.349, 0.873, 1.745, 1.745};
   constexpr std::array<double, kReferenceClasses> kScale_ppm{300.0, 500.0, 1000.0, 5000.0, 5000.0};
+  constexpr std::array<double, kReferenceClasses> kCorner_hz{80.0, 80.0, 80.0, 40.0, 40.0};
   for (std::size_t i = 0; i < kReferenceClasses; ++i) {
     const ReferenceClass of = reference_class(static_cast<int>(i) + 1);
     double scale2 = 0.0;
     double lean2 = 0.0;
+    double corner_hz = 0.0;
     for (int unit = 0; unit < kUnits; ++unit) {
       Random random(static_cast<std::uint64_t>(unit), "reference");
       ImuErrors errors;
       draw_imperfections(reference_imperfections(WorldKind::kHarsh, of), random, errors);
       scale2 += (errors.gyro.scale.squaredNorm() + errors.accel.scale.squaredNorm()) / (6 * kUnits);
       lean2 += std::pow(2.0 * errors.accel.misalignment(0, 1), 2) / kUnits;
-      EXPECT_EQ(slow_delay_s(errors.gyro), 0.0);
+      corner_hz += errors.gyro.low_pass_hz / kUnits;
       EXPECT_TRUE(errors.accel_places_s_m.isZero(0.0));
     }
+    EXPECT_NEAR(corner_hz / kCorner_hz[i], 1.0, 0.01);
     EXPECT_NEAR(std::sqrt(scale2) * 1e6, kScale_ppm[i], 0.017 * kScale_ppm[i]);
     EXPECT_NEAR(std::sqrt(lean2) * 1e3, kAxes_mrad[i], 0.067 * kAxes_mrad[i]);
   }

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "firmware_sim/imu/imu_model.h"
@@ -151,7 +152,7 @@ TEST_F(ImuModelTest, ReadingsEndAtTheRangeAndFallOnSteps) {
   for (const double rate : reading.omega_radps) EXPECT_NEAR(rate / 0.001, std::round(rate / 0.001), 1e-9);
 }
 
-TEST_F(ImuModelTest, ALowPassDelaysTheMotionByItsTimeConstant) {
+TEST_F(ImuModelTest, ALowPassDelaysTheMotionAsAButterworthOfSecondOrderDoes) {
   constexpr double kCorner_hz = 40.0;
   const double tau_s = 1.0 / (2.0 * 3.14159265358979323846 * kCorner_hz);
   ImuErrors errors;
@@ -160,11 +161,12 @@ TEST_F(ImuModelTest, ALowPassDelaysTheMotionByItsTimeConstant) {
   for (double t_s = 30.0; t_s < 60.0; t_s += kStep_s) {
     const Eigen::Vector3d error = model.sample_at(t_s).gyro_error_radps;
     if (t_s < 30.1) continue;
-    // Two terms of the delay's series; the third, tau^3 omega''' with omega''' below 60 rad/s^4, is left.
+    // 1 / (1 + sqrt(2) tau s + tau^2 s^2) = 1 - sqrt(2) tau s + tau^2 s^2 + 0 s^3 - tau^4 s^4 ...: less is left than
+    // a tenth of tau^3 omega''' with omega''' below 60 rad/s^4.
     const auto acceleration = [](double t) { return motion().state_at(t).omega_dot_ib_b_radps2; };
     const Eigen::Vector3d jerk = (acceleration(t_s + 1e-3) - acceleration(t_s - 1e-3)) / 2e-3;
-    const Eigen::Vector3d expected = -tau_s * acceleration(t_s) + tau_s * tau_s * jerk;
-    EXPECT_LT((error - expected).norm(), 60.0 * tau_s * tau_s * tau_s);
+    const Eigen::Vector3d expected = -std::numbers::sqrt2 * tau_s * acceleration(t_s) + tau_s * tau_s * jerk;
+    EXPECT_LT((error - expected).norm(), 6.0 * tau_s * tau_s * tau_s);
   }
 }
 

@@ -293,6 +293,52 @@ TEST(Motion, AShortDriveStillMovesAfterTenSeconds) {
   EXPECT_LT(motion.state_at(59.9).v_n_mps.norm(), 1e-12);
 }
 
+/// Mean square over the drive of the second difference over 1/60 s: a sine of 15 Hz counts twice, one of 1 Hz by
+/// 0.01 of its amplitude. And that of the value itself.
+struct Shaking {
+  double fast = 0.0;
+  double whole = 0.0;
+};
+Shaking shaking_of(const Motion& motion, double (*value)(const MotionState&)) {
+  constexpr double kQuarter_s = 1.0 / 60.0;
+  constexpr int kPoints = 20000;
+  Shaking shaking;
+  for (int k = 0; k < kPoints; ++k) {
+    const double t_s = 100.0 + 0.03 * k;
+    const double middle = value(motion.state_at(t_s));
+    const double second =
+        middle - 0.5 * (value(motion.state_at(t_s - kQuarter_s)) + value(motion.state_at(t_s + kQuarter_s)));
+    shaking.fast += second * second / kPoints;
+    shaking.whole += middle * middle / kPoints;
+  }
+  return shaking;
+}
+
+TEST(Motion, OnARoughRoadTheBodyShakesUpToFifteenHertz) {
+  Scenario scenario;
+  const Motion smooth(scenario);
+  scenario.rough_road_to_hz = kWheelHop_hz;
+  const Motion rough(scenario);
+  const auto roll = [](const MotionState& state) { return state.omega_ib_b_radps.x(); };
+  const auto pitch = [](const MotionState& state) { return state.omega_ib_b_radps.y(); };
+  const auto heave = [](const MotionState& state) { return state.f_b_mps2.z() + 9.81; };
+  double speed2 = 0.0;
+  for (int k = 0; k < 20000; ++k)
+    speed2 += std::pow(smooth.state_at(100.0 + 0.03 * k).v_n_mps.norm() / 10.0, 2) / 20000;
+  const auto sd_per_speed = [&](double (*of)(const MotionState&)) {
+    return std::sqrt((shaking_of(rough, of).whole - shaking_of(smooth, of).whole) / speed2);
+  };
+  EXPECT_NEAR(sd_per_speed(roll) / kRadPerDeg, 3.0, 0.15);
+  EXPECT_NEAR(sd_per_speed(pitch) / kRadPerDeg, 3.0, 0.15);
+  EXPECT_NEAR(sd_per_speed(heave), 0.5, 0.05);
+  // From 1.5 to 15 Hz with the same power: the mean of (1 - cos(2 pi f / 60 Hz))^2 over the band is 0.252.
+  for (const auto of : {+roll, +pitch})
+    EXPECT_NEAR((shaking_of(rough, of).fast - shaking_of(smooth, of).fast) / speed2,
+                0.252 * std::pow(3.0 * kRadPerDeg, 2), 0.02 * std::pow(3.0 * kRadPerDeg, 2));
+  EXPECT_LT(shaking_of(smooth, roll).fast, 0.01 * shaking_of(rough, roll).fast);
+  EXPECT_EQ(rough.state_at(30.0).f_b_mps2, smooth.state_at(30.0).f_b_mps2) << "no road where it stands";
+}
+
 TEST(Motion, SameSeedSameMotionAndAnotherSeedAnother) {
   Scenario scenario;
   scenario.duration_s = 200.0;

@@ -70,6 +70,8 @@ TrueSensor true_sensor(const standard_drive::Draw& draw, std::size_t study) {
   truth.x.segment<3>(batch::kAlpha) = -imuscope::log_so3(known.C_s_accel);
   truth.x.segment<6>(batch::kAccelShape) = shape_of(accel);
   truth.x[batch::kAccelDelay] = known.accel_t_d_s;
+  truth.x[batch::kReferenceAccelDelay] =
+      imusim::slow_delay_s(draw.reference.gyro) - imusim::slow_delay_s(draw.reference.accel);
   for (Eigen::Index j = 0; j < 6; ++j)
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       truth.x[batch::kPlaces + j] += imuscope::place_basis(axis, j).dot(errors.accel_places_s_m.col(axis));

@@ -74,7 +74,9 @@ Vector3d normal3(imusim::Random& random) {
 Truth::Truth(const imusim::Scenario& scenario, double duration_s, imusim::WorldKind world)
     : motion_([&] {
         imusim::Scenario shaken = scenario;
-        shaken.engine_runs = world == imusim::WorldKind::kHarsh;
+        if (world != imusim::WorldKind::kHarsh) return shaken;
+        shaken.engine_runs = true;
+        shaken.rough_road_to_hz = imusim::kWheelHop_hz;
         return shaken;
       }()),
       world_(world),
@@ -109,7 +111,10 @@ Draw draw(const DrawOptions& options, imusim::Random& random, std::uint64_t seed
 
 s_imu_score::SImuTruth truth_of(const Draw& draw, std::size_t study) {
   const imusim::ImuErrors& errors = draw.studies[study];
-  const double gyro_delay_s = imusim::slow_delay_s(errors.gyro);
+  // How much later than the reference's.
+  const double gyro_delay_s = imusim::slow_delay_s(errors.gyro) - imusim::slow_delay_s(draw.reference.gyro);
+  const double accel_delay_s =
+      imusim::slow_delay_s(errors.accel) - imusim::slow_delay_s(draw.reference.accel);
   s_imu_score::SImuTruth truth;
   // A crooked triad's frame is that of its axes, as it is published.
   const Matrix3d accel_frame = imusim::triad_frame(imusim::triad_matrix(errors.accel) * mounting_of(study));
@@ -119,7 +124,7 @@ s_imu_score::SImuTruth truth_of(const Draw& draw, std::size_t study) {
   truth.gyro_scale = errors.gyro.scale;
   truth.accel_scale = errors.accel.scale;
   truth.C_s_accel = accel_frame * truth.C_b_s.transpose();
-  truth.accel_t_d_s = gyro_delay_s - imusim::slow_delay_s(errors.accel);
+  truth.accel_t_d_s = gyro_delay_s - accel_delay_s;
   return truth;
 }
 

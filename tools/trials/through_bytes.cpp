@@ -116,7 +116,7 @@ s_imu_score::SImuTruth truth_of(const json& imu) {
   truth.gyro_scale = vector("gyro_scale");
   truth.accel_scale = vector("accel_scale");
   truth.C_s_accel = imuscope::to_eigen(imu.at("C_s_accel").get<imuscope::Matrix3>());
-  truth.accel_t_d_s = imu.at("gyro_delay_s").get<double>() - imu.at("accel_delay_s").get<double>();
+  truth.accel_t_d_s = imu.at("accel_t_d_s").get<double>();
   return truth;
 }
 

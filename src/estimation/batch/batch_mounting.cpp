@@ -91,16 +91,16 @@ Eigen::MatrixXd reference_series(const Grid& grid, const Eigen::RowVectorXd& mea
 }
 
 /// What the reference's gyros show in the mean, by band.
-void set_gyro_power(Problem& problem) {
+void set_gyro_moment(Problem& problem) {
   const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
-  problem.mean_gyro_power.setZero(problem.bands.size());
+  problem.gyro_moment.assign(static_cast<std::size_t>(problem.bands.size()), Eigen::Matrix3d::Zero());
   for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
-    const double values =
-        3.0 * static_cast<double>(problem.bands.width(band) * n_windows) / kWindowsPerInstant;
+    const double values = static_cast<double>(problem.bands.width(band) * n_windows) / kWindowsPerInstant;
     for (Eigen::Index w = 0; w < n_windows; ++w)
-      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k)
-        problem.mean_gyro_power[band] +=
-            problem.reference.row(w, k).segment<3>(kOmega).squaredNorm() / values;
+      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k) {
+        const Vector3c omega = problem.reference.row(w, k).segment<3>(kOmega).transpose();
+        problem.gyro_moment[static_cast<std::size_t>(band)] += (omega * omega.adjoint()).real() / values;
+      }
   }
 }
 
@@ -150,7 +150,7 @@ class Batch {
     reference_mean_ = mean_of(grid.motion, grid.valid);
     study_mean_ = mean_of(study.motion, study.valid);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
-    set_gyro_power(problem_);
+    set_gyro_moment(problem_);
     class_.reference = reference_grade(reference_gyro_white_radps_per_sqrt_hz_.value_or(
         quietest_gyro_white_radps_per_sqrt_hz(grid.motion.leftCols<3>(), grid.valid)));
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
@@ -262,7 +262,8 @@ class Batch {
     if (!result.change.is_told()) {
       return work_error(
           "its estimate runs away",
-          "the drive tells too little: more turns, braking and accelerating, and a minute of rest");
+          "the drive tells too little: more turns, braking and accelerating, and a minute of rest; or its mounting "
+          "changes: study each half of the recording by itself");
     }
     // By how much, an estimate that fits neither part does not tell well.
     return work_error(

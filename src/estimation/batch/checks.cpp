@@ -18,7 +18,7 @@ namespace imuscope::batch {
 namespace {
 
 /// Nobody turns, brakes and accelerates enough in less.
-constexpr double kShortestRecord_s = 45.0;
+constexpr double kShortestRecord_s = 40.0;
 /// Scale errors stay within a few per cent; a factor beyond this is a unit.
 constexpr double kRatioMax = 1.5;
 /// Before the two are brought together: no noise makes such a difference of what moves.

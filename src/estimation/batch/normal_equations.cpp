@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,12 +23,12 @@ using Jacobian = Eigen::Matrix<complex<double>, 6, kColumns>;
 
 /// Share that the reference's noise may have in the covariance of a residual, for it to stay one.
 constexpr double kLargestWeight = 0.9;
-/// Share of what the reference's gyros show that may be their noise, for their derivative to be a motion.
-constexpr double kNoisyMotion = 0.2;
+/// Shares of the reference's noise in what its gyros show along a direction: up to the first their derivative is a
+/// motion, from the second on it is none.
+constexpr double kMotion = 0.1;
+constexpr double kNoMotion = 0.3;
 /// Windows, evenly over the record, that tell its noise: a band's numbers in them are some thousand.
 constexpr Eigen::Index kWindowsOfShownNoise = 24;
-/// Factor of a variance that leaves no weight.
-constexpr double kTellsNothing = 1e6;
 
 /// B-9: derivatives of predicted() in every parameter, then in the band's deviation.
 void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion, const Vector3c& study_f,
@@ -50,6 +51,9 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
   J.block<3, 1>(3, kDispersion + 1) = dispersed(frequency_hz) * felt;
   J.col(kClockRate) = from_middle_s * J.col(kTimeOffset);
   J.block<3, 1>(3, kAccelDelay) = J.block<3, 1>(3, kTimeOffset);
+  const Vector3c of_arms = of_lever_arms(t, motion);
+  J.block<3, 1>(3, kReferenceAccelDelay) = derivative(frequency_hz) * of_arms;
+  J.block<3, 1>(3, kReferenceAccelDelay + 1) = dispersed(frequency_hz) * of_arms;
   J.block<3, 3>(3, kAlpha) = accel_shape * skew_c(force_a);
   for (Eigen::Index j = 0; j < 6; ++j) {
     const Eigen::Matrix3d d = shape_derivative(j, sensor.above);
@@ -106,7 +110,7 @@ ReferencePower reference_power(const Transfer& t, double of_gyros, double of_acc
 }
 
 /// @param power  of the residual, by axis
-Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, double of_accels, bool forces_tell,
+Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, double of_accels,
                  double frequency_hz) {
   Weight weight;
   weight.power = power;
@@ -130,7 +134,6 @@ Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, doubl
   }
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   for (Eigen::Index i = 0; i < 6; ++i) covariance(i, i) = power[i];
-  if (!forces_tell) covariance.diagonal().tail<3>() *= kTellsNothing;
   weight.gain = gain * scale.cwiseProduct(scale).asDiagonal();
   weight.factor.compute(covariance);
   return weight;
@@ -227,7 +230,7 @@ class BandSummer {
   /// B-21
   Slopes slopes(Eigen::Index band, const std::array<ReferenceError, kReferenceErrors>& errors) {
     const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
-    set_forces_tell(band);
+    set_known_turns(band);
     Slopes sum = Slopes::Zero();
     for (Eigen::Index w = 0; w < static_cast<Eigen::Index>(problem_.plan.starts.size()); ++w) {
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
@@ -251,7 +254,7 @@ class BandSummer {
     sums.scores.resize(n_windows, kColumns);
     decltype(sums.information) of_accels = sums.information;
     WhitenedRows rows(problem_.bands.width(band));
-    const Eigen::Vector2d share = set_forces_tell(band);
+    const Eigen::Vector2d share = set_known_turns(band);
     for (Eigen::Index w = 0; w < n_windows; ++w) {
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
         fill(t, band, w, k, rows, k - problem_.bands.first(band));
@@ -272,7 +275,7 @@ class BandSummer {
   /// B-13a: the information, less what of it both IMUs have in common.
   Eigen::Matrix<double, kColumns, kColumns> shown_noise(Eigen::Index band) {
     const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
-    set_forces_tell(band);
+    set_known_turns(band);
     Eigen::Matrix<double, kColumns, kColumns> all = Eigen::Matrix<double, kColumns, kColumns>::Zero();
     Eigen::Matrix<double, kColumns, kColumns> common = Eigen::Matrix<double, kColumns, kColumns>::Zero();
     const Eigen::Index width = problem_.bands.width(band);
@@ -306,12 +309,23 @@ class BandSummer {
   }
 
  private:
+  /// B-12a
   /// @return  the reference's mean share of the band's noise
-  Eigen::Vector2d set_forces_tell(Eigen::Index band) {
+  Eigen::Vector2d set_known_turns(Eigen::Index band) {
     Eigen::Vector2d share = reference_.mean_share(noise_, band);
-    forces_tell_ =
-        share[0] * noise_.power(band).head<3>().mean() <= kNoisyMotion * problem_.mean_gyro_power[band];
+    const double noise = share[0] * noise_.power(band).head<3>().mean();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> moment(
+        problem_.gyro_moment[static_cast<std::size_t>(band)]);
+    const Eigen::Array3d of_noise = noise / moment.eigenvalues().array().max(noise);
+    const Eigen::Array3d known = ((kNoMotion - of_noise) / (kNoMotion - kMotion)).max(0.0).min(1.0);
+    known_turns_ = moment.eigenvectors() * known.matrix().asDiagonal() * moment.eigenvectors().transpose();
     return share;
+  }
+
+  /// B-12a
+  void leave_known_turns(Motion& motion) const {
+    const Vector3c omega_dot = omega_dot_of(motion);
+    motion.arm += skew_c(known_turns_ * omega_dot - omega_dot);
   }
 
   struct Whitened {
@@ -333,13 +347,13 @@ class BandSummer {
 
   [[nodiscard]] Weight weight_at(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k) const {
     const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
-    return weight_of(t, noise_.window_power(w, band), of_reference[0], of_reference[1], forces_tell_,
+    return weight_of(t, noise_.window_power(w, band), of_reference[0], of_reference[1],
                      problem_.plan.frequency_hz(k));
   }
 
   /// Whitened derivatives, in J_.
-  void differentiate(const Transfer& t, const Weight& weight, const Motion& motion, Eigen::Index w,
-                     Eigen::Index k) {
+  void differentiate(const Transfer& t, const Weight& weight, Motion motion, Eigen::Index w, Eigen::Index k) {
+    leave_known_turns(motion);
     const Vector3c study_f = study_.row(w, k).tail<3>().transpose();
     jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], problem_.plan.frequency_hz(k),
              problem_.from_middle_s[w], J_);
@@ -363,7 +377,7 @@ class BandSummer {
     WhitenedRows rows(6);
     for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
       const double f_hz = problem_.plan.frequency_hz(k);
-      const Weight weight = weight_of(t, power, of_gyros, of_accels, forces_tell_, f_hz);
+      const Weight weight = weight_of(t, power, of_gyros, of_accels, f_hz);
       const Matrix6c W_inverse = weight.factor.solve(Matrix6c::Identity());
       Matrix6c motion_covariance = -weight.gain * W_inverse * weight.gain.adjoint();
       for (Eigen::Index i = 0; i < 6; ++i) motion_covariance(i, i) += weight.reference_power[i];
@@ -375,6 +389,7 @@ class BandSummer {
       for (Eigen::Index j = 0; j < 6; ++j) {
         Motion motion{L.col(j).head<3>(), L.col(j).tail<3>(), Matrix3c::Zero(), Matrix3c::Zero()};
         motion.arm = skew_c(derivative(f_hz) * motion.omega);
+        leave_known_turns(motion);
         jacobian(estimate_.sensor, t, motion, Vector3c::Zero(), 0.0, f_hz, 0.0, J_);
         J_ *= root_n;
         weight.factor.matrixL().solveInPlace(J_);
@@ -393,7 +408,7 @@ class BandSummer {
   const NoiseBands& noise_;
   const ReferenceNoise& reference_;
   bool corrected_;
-  bool forces_tell_ = true;
+  Eigen::Matrix3d known_turns_ = Eigen::Matrix3d::Identity();  ///< of the band
   Jacobian J_;
 };
 

@@ -23,9 +23,9 @@ struct Problem {
   Spectra reference;              ///< kReferenceColumns
   Eigen::VectorXcd constant;      ///< window_spectrum()
   Eigen::VectorXd from_middle_s;  ///< of each window's middle, from the record's
-  /// By band: what the reference's gyros show in the mean. Where most of it is their noise, accelerations at
-  /// the lever arm are not known, and forces tell nothing.
-  Eigen::VectorXd mean_gyro_power;
+  /// By band: second moment of what the reference's gyros show, as power. Along a direction in which much of it is
+  /// their noise, accelerations at the lever arm are not known (B-12a).
+  std::vector<Eigen::Matrix3d> gyro_moment;
 };
 
 /// The estimate of everything: sensor, and each band's deviation with the sd that such deviations have there.

@@ -30,10 +30,13 @@ double correlation_along(const TriadMoments& m, const Vector3d& u, const Vector3
   return size > 0.0 ? u.dot(m.study_reference * v) / size : 0.0;
 }
 
+/// Instants that are averaged before moments are taken: half a second.
+constexpr auto kAveraged = static_cast<Eigen::Index>(kGridRate_hz / 2.0);
+
 struct Means {
   Eigen::Matrix<double, 6, 1> reference = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 1> study = Eigen::Matrix<double, 6, 1>::Zero();
-  double n = 0.0;
+  double n = 0.0;  ///< instants at which both are valid
 };
 
 bool both_valid(const Grid& reference, const Grid& study, Eigen::Index row) {
@@ -41,9 +44,10 @@ bool both_valid(const Grid& reference, const Grid& study, Eigen::Index row) {
   return reference.valid[i] != 0 && study.valid[i] != 0;
 }
 
-Means means_of(const Grid& reference, const Grid& study) {
+/// Over the instants [first, end).
+Means means_of(const Grid& reference, const Grid& study, Eigen::Index first, Eigen::Index end) {
   Means means;
-  for (Eigen::Index i = 0; i < reference.motion.rows(); ++i) {
+  for (Eigen::Index i = first; i < end; ++i) {
     if (!both_valid(reference, study, i)) continue;
     means.n += 1.0;
     means.reference += reference.motion.row(i).transpose();
@@ -56,10 +60,10 @@ Means means_of(const Grid& reference, const Grid& study) {
   return means;
 }
 
-void add(const Vector3d& s, const Vector3d& b, TriadMoments& moments) {
-  moments.study_reference += s * b.transpose();
-  moments.study += s * s.transpose();
-  moments.reference += b * b.transpose();
+void add(const Vector3d& s, const Vector3d& b, double weight, TriadMoments& moments) {
+  moments.study_reference += weight * s * b.transpose();
+  moments.study += weight * s * s.transpose();
+  moments.reference += weight * b * b.transpose();
 }
 
 /// A triad's moments, as if all it shows were of size one.
@@ -97,16 +101,18 @@ double TriadMoments::most_lost(const Matrix3d& C_b_s, double from) const {
 }
 
 PairMoments::PairMoments(const Grid& reference, const Grid& study) {
-  const Means means = means_of(reference, study);
+  const Eigen::Index rows = reference.motion.rows();
+  const Means means = means_of(reference, study, 0, rows);
   mean_force_b_ = means.reference.tail<3>();
   mean_force_s_ = means.study.tail<3>();
-  for (Eigen::Index i = 0; i < reference.motion.rows(); ++i) {
-    if (!both_valid(reference, study, i)) continue;
-    const Eigen::Matrix<double, 6, 1> b = reference.motion.row(i).transpose() - means.reference;
-    const Eigen::Matrix<double, 6, 1> s = study.motion.row(i).transpose() - means.study;
-    add(s.head<3>(), b.head<3>(), rates);
-    add(s.tail<3>(), b.tail<3>(), forces);
-    add(s.tail<3>() + mean_force_s_, b.tail<3>() + mean_force_b_, forces_with_gravity);
+  for (Eigen::Index first = 0; first < rows; first += kAveraged) {
+    const Means slow = means_of(reference, study, first, std::min(first + kAveraged, rows));
+    if (slow.n == 0.0) continue;
+    const Eigen::Matrix<double, 6, 1> b = slow.reference - means.reference;
+    const Eigen::Matrix<double, 6, 1> s = slow.study - means.study;
+    add(s.head<3>(), b.head<3>(), slow.n, rates);
+    add(s.tail<3>(), b.tail<3>(), slow.n, forces);
+    add(slow.study.tail<3>(), slow.reference.tail<3>(), slow.n, forces_with_gravity);
   }
 }
 

@@ -28,7 +28,8 @@ struct TriadMoments {
   [[nodiscard]] double most_lost(const Eigen::Matrix3d& C_b_s, double from) const;
 };
 
-/// Moments of both triads over the instants at which both IMUs are valid.
+/// Moments of both triads over the instants at which both IMUs are valid, of what is slow: means over half a
+/// second. Forces of a body that shakes differ from place to place by its angular acceleration.
 class PairMoments {
  public:
   PairMoments(const Grid& reference, const Grid& study);

@@ -25,7 +25,7 @@ struct Kind {
   Eigen::Index count;
   bool may_be_smaller;  ///< than the class says
 };
-constexpr std::array<Kind, 12> kKinds{{{kGyroShape, 3, false},
+constexpr std::array<Kind, 14> kKinds{{{kGyroShape, 3, false},
                                        {kGyroShape + 3, 3, false},
                                        {kAlpha, 3, false},
                                        {kAccelShape, 3, false},
@@ -36,7 +36,9 @@ constexpr std::array<Kind, 12> kKinds{{{kGyroShape, 3, false},
                                        {kAccelFade, 3, true},
                                        {kAccelFlexure, 6, true},
                                        {kCompliance, 9, true},
-                                       {kDispersion, 2, false}}};
+                                       {kDispersion, 2, false},
+                                       {kReferenceAccelDelay, 1, false},
+                                       {kReferenceAccelDelay + 1, 1, false}}};
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;

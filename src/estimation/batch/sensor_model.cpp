@@ -139,6 +139,8 @@ ParameterVector prior_sd(const SensorClass& sensor) {
   sd.segment<6>(kAccelFlexure).setConstant(sensor.accel_flexure_sd);
   sd.segment<9>(kCompliance).setConstant(sensor.compliance_sd);
   sd.segment<2>(kDispersion).setConstant(sensor.dispersion_sd_s);
+  sd[kReferenceAccelDelay] = sensor.accel_delay_sd_s;
+  sd[kReferenceAccelDelay + 1] = sensor.dispersion_sd_s;
   sd.segment<3>(kShaking).setConstant(sensor.shaking_sd_m);
   return sd;
 }

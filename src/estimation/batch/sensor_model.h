@@ -25,7 +25,7 @@ enum Parameter : Eigen::Index {
   kGyroShape = 14,     ///< 6: scale x, y, z; departure of y from x, z from x, z from y from a right angle
   kAlpha = 20,         ///< 3: accelerometer triad against the gyro triad, rotation vector in s
   kAccelShape = 23,    ///< 6: as kGyroShape
-  kAccelDelay = 29,    ///< of the accelerometers against the gyros, on top of t_d, s
+  kAccelDelay = 29,    ///< z_f(t) shows the reference's forces at t + t_d + this, s
   kPlaces = 30,        ///< 6: where the three accelerometers are about their middle, by place_basis(), m
   kGSensitivity = 36,  ///< 9: row-major, rad/s per m/s^2
   kFlexure = 45,       ///< 9: row-major; what the body between the IMUs gives way to, at kFlexure_hz
@@ -36,9 +36,12 @@ enum Parameter : Eigen::Index {
   kCompliance = 63,  ///< 9: row-major, rad per m/s^2; how far the mount turns under forces
   kDispersion =
       72,  ///< 2: of gyros, of accelerometers; growth of their t_d from slow motion to kFlexure_hz, s
+  kReferenceAccelDelay =
+      74,  ///< 2: of the reference's accelerometers against its gyros, signed as kAccelDelay, and its growth to
+           ///< kFlexure_hz, s
   kShaking =
-      74,  ///< 3: as kLeverArm, for rates that are faster than the low-pass; a body's is its lever arm, m
-  kParameters = 77,
+      76,  ///< 3: as kLeverArm, for rates that are faster than the low-pass; a body's is its lever arm, m
+  kParameters = 79,
 };
 
 /// Flexure, fading and dispersion grow with the square of the frequency below the body's resonances and the sensors'
@@ -61,9 +64,9 @@ struct SensorClass {
   double accel_bias_sd_mps2 = 0.5;
   double gyro_scale_sd = 0.01;
   double accel_scale_sd = 0.01;
-  double axis_sd_rad = 1.75e-3;   ///< non-orthogonality, 0.1 deg
-  double triad_sd_rad = 1.75e-3;  ///< gyro against accelerometer triad, 0.1 deg
-  double accel_delay_sd_s = 1e-3;
+  double axis_sd_rad = 1.75e-3;        ///< non-orthogonality, 0.1 deg
+  double triad_sd_rad = 1.75e-3;       ///< gyro against accelerometer triad, 0.1 deg
+  double accel_delay_sd_s = 1e-3;      ///< of either IMU's accelerometers against its gyros
   double place_sd_m = 0.02;            ///< three chips, each in each axis
   double one_chip_place_sd_m = 0.001;  ///< all three on one chip
   double g_sensitivity_sd = 8.9e-5;    ///< 0.05 deg/s per g

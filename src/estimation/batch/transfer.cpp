@@ -12,6 +12,11 @@ Matrix3c skew_c(const Vector3c& v) {
   return m;
 }
 
+Vector3c omega_dot_of(const Motion& motion) {
+  const Matrix3c turning = 0.5 * (motion.arm - motion.arm.transpose());
+  return {turning(2, 1), turning(0, 2), turning(1, 0)};
+}
+
 namespace {
 
 /// w w' - |w|^2 I of the products xx, yy, zz, xy, xz, yz.
@@ -48,10 +53,9 @@ Motion excess_motion(const ReferenceError& error, const Motion& motion) {
   const auto of_product = [](const Eigen::Matrix3d& E, const Matrix3c& product) -> Matrix3c {
     return E * product + product * E.transpose();
   };
-  const Matrix3c turning = 0.5 * (motion.arm - motion.arm.transpose());
   Matrix3c outer = 0.5 * (motion.arm + motion.arm.transpose());
   outer -= 0.5 * outer.trace() * Matrix3c::Identity();
-  const Vector3c omega_dot(turning(2, 1), turning(0, 2), turning(1, 0));
+  const Vector3c omega_dot = omega_dot_of(motion);
   const Matrix3c d_outer = of_product(error.gyro, outer);
   Motion excess;
   excess.omega = error.gyro * motion.omega;
@@ -76,6 +80,7 @@ Transfer::Transfer(const SensorState& sensor, const DeviationVector& deviation)
       accel_bias(sensor.x.segment<3>(kAccelBias)),
       fade(sensor.x.segment<3>(kAccelFade)),
       delay_s(sensor.x[kAccelDelay]),
+      reference_delay_s(sensor.x.segment<2>(kReferenceAccelDelay)),
       dispersion_s(sensor.x.segment<2>(kDispersion)),
       shaking_b_m(sensor.x.segment<3>(kShaking)) {
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -97,17 +102,22 @@ complex<double> dispersed(double frequency_hz) {
   return flexure_gain(frequency_hz) * derivative(frequency_hz);
 }
 
-// B-8: each at its place, B-8a added
-Vector3c accelerometers(const Transfer& t, const Motion& motion) {
-  const Vector3c middle = motion.force_at(t.arm_b_m) + of_turned_mount(t, motion) +
-                          motion.shaking * t.shaking_b_m.cast<complex<double>>();
+// B-8: each at its place
+Vector3c of_lever_arms(const Transfer& t, const Motion& motion) {
   Vector3c felt;
   for (Eigen::Index i = 0; i < 3; ++i) {
-    const Vector3c there =
-        middle + motion.arm * t.place_b_m[static_cast<std::size_t>(i)].cast<complex<double>>();
+    const Eigen::Vector3d arm_b_m = t.arm_b_m + t.place_b_m[static_cast<std::size_t>(i)];
+    const Vector3c there = motion.arm * arm_b_m.cast<complex<double>>();
     felt[i] = (t.accel.row(i).cast<complex<double>>() * there).value();
   }
   return felt;
+}
+
+// B-8a added
+Vector3c accelerometers(const Transfer& t, const Motion& motion) {
+  const Vector3c at_reference =
+      motion.f + of_turned_mount(t, motion) + motion.shaking * t.shaking_b_m.cast<complex<double>>();
+  return t.accel * at_reference + of_lever_arms(t, motion);
 }
 
 // B-7: what motion alone makes
@@ -128,6 +138,8 @@ Vector6c predicted(const Transfer& t, const Motion& motion, const Vector3c& stud
   // B-8; the other axes' forces by B-8a
   y.tail<3>() =
       felt * (1.0 + derivative(frequency_hz) * t.delay_s + dispersed(frequency_hz) * t.dispersion_s[1]) +
+      (derivative(frequency_hz) * t.reference_delay_s[0] + dispersed(frequency_hz) * t.reference_delay_s[1]) *
+          of_lever_arms(t, motion) +
       flexure_gain(frequency_hz) *
           (t.fade.cast<complex<double>>().cwiseProduct(felt) + t.accel_flexure * felt) +
       t.accel_deviation * force_s + constant * t.accel_bias;

@@ -48,6 +48,9 @@ struct Motion {
 
 [[nodiscard]] Matrix3c skew_c(const Vector3c& v);
 
+/// omega' of `arm`.
+[[nodiscard]] Vector3c omega_dot_of(const Motion& motion);
+
 /// As the reference shows it.
 [[nodiscard]] Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k);
 
@@ -69,6 +72,7 @@ struct Transfer {
   Eigen::Vector3d gyro_bias, accel_bias;
   Eigen::Vector3d fade;
   double delay_s;
+  Eigen::Vector2d reference_delay_s;
   Eigen::Vector2d dispersion_s;
   Eigen::Vector3d shaking_b_m;
 
@@ -82,7 +86,9 @@ struct Transfer {
 /// i w: what a derivative in time is at a frequency.
 [[nodiscard]] std::complex<double> derivative(double frequency_hz);
 
-/// B-8 without the delay: what the three accelerometers feel, each at its place.
+/// Of B-8: what the lever arm and the places make the three accelerometers feel.
+[[nodiscard]] Vector3c of_lever_arms(const Transfer& t, const Motion& motion);
+/// B-8 without the delays: what the three accelerometers feel, each at its place.
 [[nodiscard]] Vector3c accelerometers(const Transfer& t, const Motion& motion);
 /// B-7: rates as the gyros show them, less bias and what forces add.
 [[nodiscard]] Vector3c gyros(const Transfer& t, const Motion& motion, double frequency_hz);

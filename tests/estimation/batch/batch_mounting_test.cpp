@@ -214,6 +214,47 @@ TEST(EstimateMounting, TellsALowPassFromADelay) {
   }
 }
 
+/// Forces of the lever arm are made of the reference's rates, and come with their delay.
+TEST(EstimateMounting, TellsTheReferencesTriadsApartInTime) {
+  for (int seed = 0; seed < 3; ++seed) {
+    PairOptions truth = crooked();
+    truth.road_rate = 1e-2;
+    truth.reference_accel_delay_s = 5e-4;
+    truth.reference_gyro_white = 2e-5;
+    const auto pair = make_pair(truth, 340 + static_cast<std::uint64_t>(seed));
+    const auto found = estimate_mounting(pair.reference, pair.study);
+    ASSERT_TRUE(found) << found.error().text();
+    const auto near = [&](Parameter of, double value) {
+      EXPECT_NEAR(found->sensor.x[of], value, 3.3 * found->sd(of)) << "seed " << seed << ", parameter " << of;
+      EXPECT_LT(found->sd(of), 1e-4);
+    };
+    near(kTimeOffset, truth.t_d_s);
+    near(kReferenceAccelDelay, -truth.reference_accel_delay_s);
+    // Both IMUs' accelerometers against one another: the reference's are late.
+    near(kAccelDelay, truth.accel_delay_s + truth.reference_accel_delay_s);
+    EXPECT_LT(nees(*found, truth), 22.5);  // one of a thousand
+  }
+}
+
+/// A noisy reference on a road that makes the body roll and pitch up to 9 Hz, but not yaw: what its z gyro shows there is
+/// noise, and its derivative more so.
+TEST(EstimateMounting, TakesNoNoiseForYawOnAnUnevenRoad) {
+  double total = 0.0;
+  constexpr int kSeeds = 4;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    PairOptions truth = crooked();
+    truth.road_rate = 8e-3;
+    truth.reference_gyro_white = truth.study_gyro_white = 2e-3;  // 4.8 deg/sqrt(h)
+    const auto pair = make_pair(truth, 350 + static_cast<std::uint64_t>(seed));
+    const auto found = estimate_mounting(pair.reference, pair.study);
+    ASSERT_TRUE(found) << found.error().text();
+    EXPECT_TRUE(found->settled) << seed;
+    EXPECT_LT(error_of(*found, truth).tail<3>().cwiseAbs().maxCoeff(), 0.05) << seed;
+    total += nees(*found, truth);
+  }
+  EXPECT_LT(total, 6.0 * kSeeds + 3.3 * std::sqrt(2.0 * 6.0 * kSeeds));
+}
+
 TEST(EstimateMounting, RefusesAnAxisThatIsNoSensorsByName) {
   for (const bool of_reference : {false, true}) {
     PairOptions truth = crooked();

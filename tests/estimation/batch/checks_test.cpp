@@ -35,6 +35,17 @@ TEST(FindStart, IsGoodToADegreeAndAFewMillisecondsInAnyMounting) {
   }
 }
 
+/// Far from the reference, a body that shakes feels its own forces: several times what braking makes.
+TEST(FindStart, FindsABodyThatShakesHardOnALongLeverArm) {
+  PairOptions options;
+  options.hop_rate = 0.02;
+  options.r_bs_b_m = {1.5, -0.8, 0.6};
+  const Pair pair = pair_of(options);
+  const auto start = find_start(pair.reference, pair.study, 3.0);
+  ASSERT_TRUE(start) << start.error().text();
+  EXPECT_LT(imuscope::log_so3(start->C_b_s.transpose() * options.C_b_s).norm(), 0.02);
+}
+
 /// Each must be refused as wrong, in words that name it; none may become a mounting.
 void expect_wrong(const Pair& pair, const std::string& words) {
   const auto found = estimate_mounting(pair.reference, pair.study);

@@ -30,7 +30,8 @@ struct Drawn {
     problem.bands = Bands(problem.plan.n_frequencies);
     problem.constant = window_spectrum(problem.plan);
     problem.from_middle_s = Eigen::Vector2d(-2.0, 3.0);
-    problem.mean_gyro_power.setConstant(problem.bands.size(), 1e9);
+    problem.gyro_moment.assign(static_cast<std::size_t>(problem.bands.size()),
+                               1e9 * Eigen::Matrix3d::Identity());
     const auto draw = [&](Eigen::Index columns, double size) {
       Eigen::MatrixXd series(384, columns);
       for (Eigen::Index i = 0; i < series.size(); ++i) series.data()[i] = size * normal(random);
@@ -115,7 +116,8 @@ Problem problem_of(const Eigen::MatrixXd& reference) {
   problem.constant = window_spectrum(problem.plan);
   problem.reference = Spectra(problem.plan, reference);
   problem.from_middle_s.setLinSpaced(static_cast<Eigen::Index>(problem.plan.starts.size()), -1.0, 1.0);
-  problem.mean_gyro_power.setConstant(problem.bands.size(), 1e9);
+  problem.gyro_moment.assign(static_cast<std::size_t>(problem.bands.size()),
+                             1e9 * Eigen::Matrix3d::Identity());
   return problem;
 }
 
@@ -134,7 +136,9 @@ TEST(NormalEquations, ScoresOfWhiteNoiseVaryAsTheInformationSays) {
   constexpr double kKept = 0.99;
   const Problem problem = problem_of(slow(random, kReferenceColumns, kKept));
   const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
-  const Estimate estimate = rigid_estimate(problem);
+  Estimate estimate = rigid_estimate(problem);
+  // Without a lever arm nothing would tell a delay of the reference's accelerometers.
+  estimate.sensor.x.segment<3>(kLeverArm).setConstant(0.3);
   const Eigen::MatrixX2d none = Eigen::MatrixX2d::Zero(problem.bands.size(), 2);
   ParameterVector sum = ParameterVector::Zero();
   constexpr int kDraws = 30;

@@ -95,7 +95,8 @@ struct DrawnProblem {
     problem.bands = Bands(problem.plan.n_frequencies);
     problem.constant = window_spectrum(problem.plan);
     problem.from_middle_s = Eigen::Vector3d(-2.0, 0.5, 3.0);
-    problem.mean_gyro_power.setConstant(problem.bands.size(), 4.0);
+    problem.gyro_moment.assign(static_cast<std::size_t>(problem.bands.size()),
+                               4.0 * Eigen::Matrix3d::Identity());
     const auto draw = [&](Eigen::Index columns) {
       Eigen::MatrixXd series(512, columns);
       for (double& value : series.reshaped()) value = normal(random);

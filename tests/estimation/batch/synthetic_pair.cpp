@@ -153,7 +153,8 @@ Pair make_pair(const PairOptions& o, std::uint64_t seed) {
   for (int i = 0; i < static_cast<int>(o.duration_s * o.reference_rate_hz); ++i) {
     const double t = i / o.reference_rate_hz;
     pair.reference.add(t, (o.reference_gyro_matrix * body.omega(t) + reference_gyro(random)).cast<float>(),
-                       (o.reference_accel_matrix * body.force(t) + reference_accel(random)).cast<float>());
+                       (o.reference_accel_matrix * body.force(t - o.reference_accel_delay_s) + reference_accel(random))
+                           .cast<float>());
   }
   std::uniform_real_distribution<double> uniform;
   LowPassed low_passed(body, o, o.t_d_s - 1.0);

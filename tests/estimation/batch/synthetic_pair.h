@@ -28,6 +28,7 @@ struct PairOptions {
   double reference_accel_white = 1e-3;                   ///< m/s^2/sqrt(Hz)
   Eigen::Matrix3d reference_gyro_matrix = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d reference_accel_matrix = Eigen::Matrix3d::Identity();
+  double reference_accel_delay_s = 0.0;  ///< of its accelerometers, behind its gyros
   double study_gyro_white = 2e-4;
   double study_accel_white = 2e-3;
   double motion = 1.0;             ///< factor of all rates and forces but gravity
