@@ -221,7 +221,7 @@ Variances6 bound_of(const standard_drive::Truth& truth, const Options& options) 
     study.prior_accel_scale_sd = alike(sensor.accel_scale_sd);
     study.prior_axes_sd_rad = 0.5 * sensor.axis_sd_rad;
     study.prior_accel_boresight_sd_rad = alike(sensor.triad_sd_rad);
-    study.prior_accel_t_d_sd_s = sensor.accel_delay_sd_s;
+    study.prior_accel_t_d_sd_s = study.prior_reference_accel_t_d_sd_s = sensor.accel_delay_sd_s;
     study.prior_place_sd_m = sensor.place_sd_m;
     study.prior_g_sensitivity_sd = sensor.g_sensitivity_sd;
   }

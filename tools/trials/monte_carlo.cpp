@@ -428,7 +428,7 @@ int main(int argc, char** argv) {
   options.straight_axes = states->count() > 0 ? straight : options.world == imusim::WorldKind::kIdeal;
   fmt::print("{} world, reference of class {}, {} states an S-IMU\n\n",
              options.world == imusim::WorldKind::kHarsh ? "harsh" : "ideal", options.reference_class,
-             options.straight_axes ? 19 : 44);
+             options.straight_axes ? 19 : 45);
   Judge judge;
   for (const Scenario& scenario : scenarios()) {
     if (options.names.find(scenario.name) == std::string::npos) continue;

@@ -24,7 +24,7 @@ inline constexpr std::size_t kNavigationStates = kLoopNavigationStates;
 inline constexpr std::size_t kNavigationCoupledStates = kLoopCoupledStates;
 inline constexpr std::size_t kCovariancePadding = 8;
 inline constexpr std::size_t kMaxMeasurementRows = kLoopMeasurementRows;
-inline constexpr std::size_t kMaxMeasurementBlocks = 12;
+inline constexpr std::size_t kMaxMeasurementBlocks = 13;
 
 /// Up to three consecutive columns of a three-row measurement matrix.
 struct MeasurementBlock {

@@ -43,14 +43,16 @@ enum SImuBlock : std::uint32_t {
   kAccelAxesBlock = 1U << 10U,     ///< likewise of the accelerometers'
   kAccelPlacesBlock = 1U << 11U,   ///< where the accelerometers are about their middle
   kGSensitivityBlock = 1U << 12U,  ///< rate that the gyros show per specific force
+  /// Of the reference's accelerometers against its gyros, whose rates the forces of the lever arm are made of.
+  kReferenceAccelTimeOffsetBlock = 1U << 13U,
 };
-/// What data sheets allow a sensor to be beyond bias, scale and noise: 25 states.
+/// What data sheets allow a sensor, and the reference's triads, to be beyond bias, scale and noise: 26 states.
 inline constexpr std::uint32_t kSensorSImuBlocks = kAccelBoresightBlock | kAccelTimeOffsetBlock |
                                                    kGyroAxesBlock | kAccelAxesBlock | kAccelPlacesBlock |
-                                                   kGSensitivityBlock;
+                                                   kGSensitivityBlock | kReferenceAccelTimeOffsetBlock;
 /// The 19 states of a sensor that is exactly rigid, orthogonal and of one delay.
 inline constexpr std::uint32_t kFullSImuBlocks = 0x7FU;
-/// All 44: the default.
+/// All 45: the default.
 inline constexpr std::uint32_t kCompleteSImuBlocks = kFullSImuBlocks | kSensorSImuBlocks;
 /// The paper's own 6 states: boresight and lever arm.
 inline constexpr std::uint32_t kPaperSImuBlocks = kBoresightBlock | kLeverArmBlock;
@@ -197,6 +199,7 @@ struct SImuConfig {
   /// sheet's alignment error is of the order of 0.1 deg.
   Vector3 prior_accel_boresight_sd_rad{0.1 * kRadPerDeg, 0.1 * kRadPerDeg, 0.1 * kRadPerDeg};
   double prior_accel_t_d_sd_s = 2e-3;
+  double prior_reference_accel_t_d_sd_s = 1e-3;
 
   /// What data sheets of industrial MEMS allow (MTx: alignment 0.1 deg, 0.05 deg/s per g); all start at zero.
   double prior_axes_sd_rad = 0.05 * kRadPerDeg;  ///< each of a pair leans by half of their departure

@@ -50,6 +50,8 @@ void for_each_prior(const SImuLayout& layout, const SImuConfig& config, Function
   alike(layout.accel_axes, 3, config.prior_axes_sd_rad);
   alike(layout.places, 6, config.prior_place_sd_m);
   alike(layout.g_sensitivity, 9, config.prior_g_sensitivity_sd);
+  if (layout.reference_accel_t_d != SImuLayout::kAbsent)
+    f(layout.reference_accel_t_d, config.prior_reference_accel_t_d_sd_s);
 }
 
 // Where a variance of the navigation is lost, these wide values stand in: m, m/s, rad.

@@ -146,6 +146,7 @@ SImuLayout SImuLayout::make(std::uint32_t blocks, std::size_t first) noexcept {
   layout.accel_axes = place(kAccelAxesBlock, 3);
   layout.places = place(kAccelPlacesBlock, 6);
   layout.g_sensitivity = place(kGSensitivityBlock, 9);
+  layout.reference_accel_t_d = place(kReferenceAccelTimeOffsetBlock, 1);
   layout.size = next - first;
   return layout;
 }
@@ -158,7 +159,8 @@ Vector3d predicted_rate(const SImuState& state, const ReferenceMean& b) noexcept
 }
 
 Vector3d predicted_force(const SImuState& state, const ReferenceMean& b) noexcept {
-  const Matrix3d M = lever_matrix(b);
+  // C-16a
+  const Matrix3d M = lever_matrix(b) + state.reference_accel_t_d_s * lever_matrix_slope(b);
   // C-16: rotation of the accelerometers' triad
   const Matrix3d C = state.C_b_s * state.accel_turn;
   // C-7, C-19: what each feels at its place
@@ -209,8 +211,8 @@ SImuMeasurement accel_measurement(const SImuState& state, const SImuLayout& layo
   const Matrix3d C = state.C_b_s * state.accel_turn;
   const Matrix3d BC = B * C;
   const Matrix3d W = skew(for_H.omega_radps);
-  const Matrix3d M = lever_matrix(for_H);
   const Matrix3d M_dot = lever_matrix_slope(for_H);
+  const Matrix3d M = lever_matrix(for_H) + state.reference_accel_t_d_s * M_dot;
   const Vector3d& r = state.r_bs_b_m;
   const Vector3d f_at_s = for_H.f_mps2 + M * r;  // in b
   const Matrix3d CMC = C * M * state.C_b_s.transpose();
@@ -234,6 +236,11 @@ SImuMeasurement accel_measurement(const SImuState& state, const SImuLayout& layo
   // C-9, C-16: time offsets
   append(m.H, layout.t_d, by_t);
   append(m.H, layout.accel_t_d, by_t);
+  // C-16a: what is made of the reference's rates
+  if (layout.reference_accel_t_d != SImuLayout::kAbsent) {
+    const Matrix3d CMC_dot = C * M_dot * state.C_b_s.transpose();
+    append(m.H, layout.reference_accel_t_d, Vector3d(B * (C * M_dot * r + by_places(state, CMC_dot))));
+  }
   // C-11: scale; C-18: axes
   append(m.H, layout.accel_scale, Matrix3d(f_s.asDiagonal()));
   append(m.H, layout.accel_axes, by_axes(f_s));
@@ -299,6 +306,8 @@ void inject(SImuState& state, const SImuLayout& layout, std::span<const double> 
     for (std::size_t j = 0; j < 6; ++j)
       state.places_s_m(static_cast<Eigen::Index>(j)) += error[layout.places + j];
   }
+  if (layout.reference_accel_t_d != SImuLayout::kAbsent)
+    state.reference_accel_t_d_s += error[layout.reference_accel_t_d];
   if (layout.g_sensitivity == SImuLayout::kAbsent) return;
   for (std::size_t i = 0; i < 3; ++i)
     state.g_sensitivity.row(static_cast<Eigen::Index>(i)) +=

@@ -44,6 +44,7 @@ std::optional<std::string> study_state(const SImuLayout& layout, std::size_t ind
   numbered(layout.g_sensitivity, 9, "g_sensitivity");
   if (index == layout.t_d) found = "t_d";
   if (index == layout.accel_t_d) found = "accel_t_d";
+  if (index == layout.reference_accel_t_d) found = "reference_accel_t_d";
   return found;
 }
 

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kFirstStudyState = 15;
 constexpr std::uint32_t kEveryBlock = kCompleteSImuBlocks;
-constexpr std::size_t kStates = kFirstStudyState + 44;
+constexpr std::size_t kStates = kFirstStudyState + 45;
 constexpr ReferenceBiasColumns kReferenceColumns{9, 12};
 
 /// A motion whose derivatives are known exactly: harmonics of rate and force.
@@ -79,9 +79,12 @@ VectorXd predicted(const Case& c, const std::array<double, kStates>& error) {
   const ReferenceKinematics b = c.motion.at(x.t_d_s);
   const Vector3d omega_s = x.C_b_s * (b.omega_radps - gyro_bias);
   const ReferenceKinematics a = c.motion.at(x.t_d_s + x.accel_t_d_s);
-  const Vector3d omega = a.omega_radps - gyro_bias;
+  // The arms' share follows the reference's gyros, its forces the reference's accelerometers.
+  const ReferenceKinematics arms =
+      c.motion.at(x.t_d_s + x.accel_t_d_s + x.reference_accel_t_d_s);
+  const Vector3d omega = arms.omega_radps - gyro_bias;
   const Vector3d f = a.f_mps2 - Vector3d(error[12], error[13], error[14]);
-  const Vector3d f_at_s = f + omega.cross(omega.cross(x.r_bs_b_m)) + a.omega_dot_radps2.cross(x.r_bs_b_m);
+  const Vector3d f_at_s = f + omega.cross(omega.cross(x.r_bs_b_m)) + arms.omega_dot_radps2.cross(x.r_bs_b_m);
   const Vector3d f_s = x.C_b_s * (x.accel_turn * f_at_s);
   // Each accelerometer at a place of its own, which the vehicle's rotation accelerates by its own amount.
   const double half = std::sqrt(0.5);
@@ -92,7 +95,7 @@ VectorXd predicted(const Case& c, const std::array<double, kStates>& error) {
     const Vector3d place_s =
         patterns(i, 0) * x.places_s_m.head<3>() + patterns(i, 1) * x.places_s_m.tail<3>();
     const Vector3d d = x.C_b_s.transpose() * place_s;
-    const Vector3d felt = omega.cross(omega.cross(d)) + a.omega_dot_radps2.cross(d);
+    const Vector3d felt = omega.cross(omega.cross(d)) + arms.omega_dot_radps2.cross(d);
     at_place(i) += (x.C_b_s * (x.accel_turn * felt))(i);
   }
   const auto leaning = [](const Vector3d& axes, const Vector3d& v) {
@@ -150,7 +153,8 @@ TEST(SImuMeasurement, JacobiansMatchCentralDifferencesAtIdentityRightAnglesAndRa
   for (std::size_t i = 0; i < 9; ++i) scale[layout.g_sensitivity + i] = 1e-4;
   scale[layout.t_d] = 0.01;
   scale[layout.accel_t_d] = 0.002;
-  const std::array<std::pair<std::size_t, std::size_t>, 15> blocks{{{9, 3},
+  scale[layout.reference_accel_t_d] = 0.001;
+  const std::array<std::pair<std::size_t, std::size_t>, 16> blocks{{{9, 3},
                                                                     {12, 3},
                                                                     {layout.psi, 3},
                                                                     {layout.r, 3},
@@ -164,7 +168,8 @@ TEST(SImuMeasurement, JacobiansMatchCentralDifferencesAtIdentityRightAnglesAndRa
                                                                     {layout.gyro_axes, 3},
                                                                     {layout.accel_axes, 3},
                                                                     {layout.places, 6},
-                                                                    {layout.g_sensitivity, 9}}};
+                                                                    {layout.g_sensitivity, 9},
+                                                                    {layout.reference_accel_t_d, 1}}};
 
   for (const Vector3d& mounting : mountings) {
     const Case c = random_case(random, mounting);
@@ -342,7 +347,7 @@ TEST(SImuLayout, LeavesOutWhatIsSwitchedOff) {
   EXPECT_EQ(paper.gyro_bias, SImuLayout::kAbsent);
   EXPECT_EQ(SImuLayout::make(kFullSImuBlocks, 15).size, 19U);
   EXPECT_EQ(SImuLayout::make(kBiasSImuBlocks, 15).size, 6U);
-  EXPECT_EQ(SImuLayout::make(kCompleteSImuBlocks, 15).size, 44U);
+  EXPECT_EQ(SImuLayout::make(kCompleteSImuBlocks, 15).size, 45U);
 }
 
 TEST(InflatedVariance, ReproducesTheLowFrequencyEquivalentsOfTableII) {
