@@ -328,13 +328,15 @@ TEST(Motion, OnARoughRoadTheBodyShakesUpToFifteenHertz) {
   const auto sd_per_speed = [&](double (*of)(const MotionState&)) {
     return std::sqrt((shaking_of(rough, of).whole - shaking_of(smooth, of).whole) / speed2);
   };
-  EXPECT_NEAR(sd_per_speed(roll) / kRadPerDeg, 3.0, 0.15);
-  EXPECT_NEAR(sd_per_speed(pitch) / kRadPerDeg, 3.0, 0.15);
-  EXPECT_NEAR(sd_per_speed(heave), 0.5, 0.05);
+  // Where in its part of the band the slowest of the waves lies changes all by some per cent.
+  EXPECT_NEAR(sd_per_speed(roll) / kRadPerDeg, 3.0, 0.4);
+  EXPECT_NEAR(sd_per_speed(pitch) / kRadPerDeg, 3.0, 0.4);
+  EXPECT_NEAR(sd_per_speed(heave), 0.5, 0.07);
   // From 1.5 to 15 Hz with the same power: the mean of (1 - cos(2 pi f / 60 Hz))^2 over the band is 0.252.
-  for (const auto of : {+roll, +pitch})
-    EXPECT_NEAR((shaking_of(rough, of).fast - shaking_of(smooth, of).fast) / speed2,
-                0.252 * std::pow(3.0 * kRadPerDeg, 2), 0.02 * std::pow(3.0 * kRadPerDeg, 2));
+  for (const auto of : {+roll, +pitch}) {
+    const double whole = shaking_of(rough, of).whole - shaking_of(smooth, of).whole;
+    EXPECT_NEAR((shaking_of(rough, of).fast - shaking_of(smooth, of).fast) / whole, 0.252, 0.02);
+  }
   EXPECT_LT(shaking_of(smooth, roll).fast, 0.01 * shaking_of(rough, roll).fast);
   EXPECT_EQ(rough.state_at(30.0).f_b_mps2, smooth.state_at(30.0).f_b_mps2) << "no road where it stands";
 }
