@@ -152,9 +152,10 @@ Pair make_pair(const PairOptions& o, std::uint64_t seed) {
   White study_accel(o.study_accel_white / std::sqrt(2.0), o.study_rate_hz);
   for (int i = 0; i < static_cast<int>(o.duration_s * o.reference_rate_hz); ++i) {
     const double t = i / o.reference_rate_hz;
-    pair.reference.add(t, (o.reference_gyro_matrix * body.omega(t) + reference_gyro(random)).cast<float>(),
-                       (o.reference_accel_matrix * body.force(t - o.reference_accel_delay_s) + reference_accel(random))
-                           .cast<float>());
+    pair.reference.add(
+        t, (o.reference_gyro_matrix * body.omega(t) + reference_gyro(random)).cast<float>(),
+        (o.reference_accel_matrix * body.force(t - o.reference_accel_delay_s) + reference_accel(random))
+            .cast<float>());
   }
   std::uniform_real_distribution<double> uniform;
   LowPassed low_passed(body, o, o.t_d_s - 1.0);

@@ -80,8 +80,7 @@ VectorXd predicted(const Case& c, const std::array<double, kStates>& error) {
   const Vector3d omega_s = x.C_b_s * (b.omega_radps - gyro_bias);
   const ReferenceKinematics a = c.motion.at(x.t_d_s + x.accel_t_d_s);
   // The arms' share follows the reference's gyros, its forces the reference's accelerometers.
-  const ReferenceKinematics arms =
-      c.motion.at(x.t_d_s + x.accel_t_d_s + x.reference_accel_t_d_s);
+  const ReferenceKinematics arms = c.motion.at(x.t_d_s + x.accel_t_d_s + x.reference_accel_t_d_s);
   const Vector3d omega = arms.omega_radps - gyro_bias;
   const Vector3d f = a.f_mps2 - Vector3d(error[12], error[13], error[14]);
   const Vector3d f_at_s = f + omega.cross(omega.cross(x.r_bs_b_m)) + arms.omega_dot_radps2.cross(x.r_bs_b_m);
