@@ -100,7 +100,7 @@ Shown shown(const Body& body, const PairOptions& o, double t) {
   return all;
 }
 
-constexpr double kFine_hz = 2000.0;
+constexpr double kFine_hz = 1000.0;
 double prewarped(double corner_hz) { return std::tan(1.5707963267948966 * 2.0 * corner_hz / kFine_hz); }
 
 /// The same behind a low-pass, at instants that are asked for in order: bilinear transform at kFine_hz, straight lines
