@@ -71,6 +71,9 @@ Imperfections reference_imperfections(WorldKind world, const ReferenceClass& of)
   reference.scale_sd = grade.scale;
   reference.low_pass_hz = grade.low_pass_hz;
   reference.low_pass_sd = kLowPassSd;
+  TriadErrors nominal;
+  nominal.low_pass_hz = grade.low_pass_hz;
+  reference.stated_delay_s = slow_delay_s(nominal);
   reference.own_vibration = 0.25;
   return reference;
 }
@@ -89,7 +92,8 @@ void draw_imperfections(const Imperfections& imperfections, Random& random, ImuE
   errors.gyro.g_sensitivity += draw9(random, imperfections.g_sensitivity_sd_s_per_m);
   const Eigen::Matrix3d places = draw9(random, imperfections.accel_place_sd_m);
   errors.accel_places_s_m = places.colwise() - Eigen::Vector3d(places.rowwise().mean());
-  errors.accel.delay_s = imperfections.delay_apart_sd_s * random.normal();
+  errors.gyro.delay_s -= imperfections.stated_delay_s;
+  errors.accel.delay_s = imperfections.delay_apart_sd_s * random.normal() - imperfections.stated_delay_s;
   errors.own_vibration = imperfections.own_vibration;
 }
 

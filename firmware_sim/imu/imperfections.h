@@ -32,13 +32,14 @@ struct Imperfections {
   double delay_apart_sd_s = 0.0;          ///< accelerometers later than gyros
   double low_pass_hz = std::numeric_limits<double>::infinity();  ///< of both triads, each with
   double low_pass_sd = 0.0;                                      ///< a corner of its own, off by this share
-  double own_vibration = 0.0;  ///< what its mount adds, as a share of the vehicle's vibration
+  double stated_delay_s = 0.0;  ///< of both triads, which the maker's time stamps take off
+  double own_vibration = 0.0;   ///< what its mount adds, as a share of the vehicle's vibration
 };
 
 /// An MTx class sensor: 0.1 deg, 2 cm, 0.05 deg/s/g, 1 ms, 40 Hz (4 Hz), half of the vehicle's vibration.
 Imperfections study_imperfections(WorldKind world);
-/// The R-IMU: scale, misalignment and bandwidth as makers of its class of gyros state them, a quarter of the
-/// vehicle's vibration.
+/// The R-IMU: scale, misalignment and bandwidth as makers of its class of gyros state them, time stamps from which
+/// the delay of such a low-pass is taken off, a quarter of the vehicle's vibration.
 Imperfections reference_imperfections(WorldKind world, const ReferenceClass& of);
 
 /// Adds what is drawn to a sensor's errors. The gyro triad's departure from orthogonality is symmetric: its

@@ -246,6 +246,7 @@ TEST(Imperfections, AReferenceIsAsStraightAsItsGyrosAreQuiet) {
     double scale2 = 0.0;
     double lean2 = 0.0;
     double corner_hz = 0.0;
+    double delay2_s2 = 0.0;
     for (int unit = 0; unit < kUnits; ++unit) {
       Random random(static_cast<std::uint64_t>(unit), "reference");
       ImuErrors errors;
@@ -253,9 +254,13 @@ TEST(Imperfections, AReferenceIsAsStraightAsItsGyrosAreQuiet) {
       scale2 += (errors.gyro.scale.squaredNorm() + errors.accel.scale.squaredNorm()) / (6 * kUnits);
       lean2 += std::pow(2.0 * errors.accel.misalignment(0, 1), 2) / kUnits;
       corner_hz += errors.gyro.low_pass_hz / kUnits;
+      delay2_s2 += std::pow(slow_delay_s(errors.accel), 2) / kUnits;
       EXPECT_TRUE(errors.accel_places_s_m.isZero(0.0));
     }
     EXPECT_NEAR(corner_hz / kCorner_hz[i], 1.0, 0.01);
+    // What its stamps leave of the low-pass's delay: a tenth, as much as corners scatter by.
+    const double of_low_pass_s = std::numbers::sqrt2 / (2.0 * std::numbers::pi * kCorner_hz[i]);
+    EXPECT_NEAR(std::sqrt(delay2_s2) / of_low_pass_s, 0.1, 0.01);
     EXPECT_NEAR(std::sqrt(scale2) * 1e6, kScale_ppm[i], 0.017 * kScale_ppm[i]);
     EXPECT_NEAR(std::sqrt(lean2) * 1e3, kAxes_mrad[i], 0.067 * kAxes_mrad[i]);
   }

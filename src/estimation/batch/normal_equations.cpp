@@ -27,6 +27,8 @@ constexpr double kLargestWeight = 0.9;
 /// motion, from the second on it is none.
 constexpr double kMotion = 0.1;
 constexpr double kNoMotion = 0.3;
+/// Share of its weight that leaves a residual none.
+constexpr double kNoWeight = 1e-6;
 /// Windows, evenly over the record, that tell its noise: a band's numbers in them are some thousand.
 constexpr Eigen::Index kWindowsOfShownNoise = 24;
 
@@ -110,8 +112,9 @@ ReferencePower reference_power(const Transfer& t, double of_gyros, double of_acc
 }
 
 /// @param power  of the residual, by axis
+/// @param forces_tell  B-12a: share of their weight that forces have
 Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, double of_accels,
-                 double frequency_hz) {
+                 double forces_tell, double frequency_hz) {
   Weight weight;
   weight.power = power;
   const ReferencePower agreed = reference_power(t, of_gyros, of_accels, frequency_hz);
@@ -134,6 +137,7 @@ Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, doubl
   }
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   for (Eigen::Index i = 0; i < 6; ++i) covariance(i, i) = power[i];
+  covariance.diagonal().tail<3>() /= std::max(forces_tell, kNoWeight);
   weight.gain = gain * scale.cwiseProduct(scale).asDiagonal();
   weight.factor.compute(covariance);
   return weight;
@@ -318,6 +322,7 @@ class BandSummer {
         problem_.gyro_moment[static_cast<std::size_t>(band)]);
     const Eigen::Array3d of_noise = noise / moment.eigenvalues().array().max(noise);
     const Eigen::Array3d known = ((kNoMotion - of_noise) / (kNoMotion - kMotion)).max(0.0).min(1.0);
+    forces_tell_ = known.maxCoeff();
     known_turns_ = moment.eigenvectors() * known.matrix().asDiagonal() * moment.eigenvectors().transpose();
     return share;
   }
@@ -347,7 +352,7 @@ class BandSummer {
 
   [[nodiscard]] Weight weight_at(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k) const {
     const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
-    return weight_of(t, noise_.window_power(w, band), of_reference[0], of_reference[1],
+    return weight_of(t, noise_.window_power(w, band), of_reference[0], of_reference[1], forces_tell_,
                      problem_.plan.frequency_hz(k));
   }
 
@@ -377,7 +382,7 @@ class BandSummer {
     WhitenedRows rows(6);
     for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
       const double f_hz = problem_.plan.frequency_hz(k);
-      const Weight weight = weight_of(t, power, of_gyros, of_accels, f_hz);
+      const Weight weight = weight_of(t, power, of_gyros, of_accels, forces_tell_, f_hz);
       const Matrix6c W_inverse = weight.factor.solve(Matrix6c::Identity());
       Matrix6c motion_covariance = -weight.gain * W_inverse * weight.gain.adjoint();
       for (Eigen::Index i = 0; i < 6; ++i) motion_covariance(i, i) += weight.reference_power[i];
@@ -408,6 +413,7 @@ class BandSummer {
   const NoiseBands& noise_;
   const ReferenceNoise& reference_;
   bool corrected_;
+  double forces_tell_ = 1.0;                                   ///< in the band
   Eigen::Matrix3d known_turns_ = Eigen::Matrix3d::Identity();  ///< of the band
   Jacobian J_;
 };
