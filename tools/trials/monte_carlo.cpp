@@ -383,7 +383,7 @@ void print(const Scenario& scenario, const Totals& t, const Options& options, Ju
   fmt::print("\n{}", t.score.table());
   if (!scenario.paper)
     fmt::print(
-        "   every kind of state within its 95 % interval in 93 to 97 % of all cases, NEES as above: {}\n",
+        "   every kind of state within its 95 % interval in 93 to 97 % of all cases, NEES as above, within 3.3 of their own sd: {}\n",
         judge(t.score.honest()));
   fmt::print(
       "   least sd of the lever arm {:.2f} %, about gravity {:.2f} % of its prior, weakest direction {:.4f}",

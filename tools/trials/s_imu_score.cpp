@@ -7,6 +7,7 @@
 #include "base/units.h"
 #include "estimation/calibration/filter_core.h"
 #include "estimation/navigation/so3.h"
+#include "tools/trials/own_sd.h"
 
 namespace s_imu_score {
 namespace {
@@ -108,10 +109,14 @@ std::string SImuScore::table() const {
 }
 
 bool SImuScore::honest() const {
-  if (n_ == 0 || nees6() < kNeesLow || nees6() > kNeesHigh) return false;
+  // A sensor's components share a drive: they count as one.
+  const double nees_off = imuscope::kOwnSd * std::sqrt(12.0 / n_);
+  const double coverage_off = imuscope::kOwnSd * std::sqrt(0.95 * 0.05 / n_);
+  if (n_ == 0 || nees6() < kNeesLow - nees_off || nees6() > kNeesHigh + nees_off) return false;
   for (const Kind& kind : kinds_) {
     if (kind.score.n() == 0) continue;
-    if (kind.score.coverage() < kCoverageLow || kind.score.coverage() > kCoverageHigh) return false;
+    const double inside = kind.score.coverage();
+    if (inside < kCoverageLow - coverage_off || inside > kCoverageHigh + coverage_off) return false;
   }
   return true;
 }

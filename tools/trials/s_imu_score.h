@@ -58,7 +58,8 @@ class SImuScore {
   /// One line per kind of state that was estimated: rms and sd (both over all axes), mean square in sd, and
   /// coverage.
   [[nodiscard]] std::string table() const;
-  /// Whether NEES and the coverage of every kind are those of an honest estimator: 5.4 to 6.6, 93 to 97 %.
+  /// Whether NEES and the coverage of every kind are those of an honest estimator: 5.4 to 6.6, 93 to 97 %, within 3.3 of
+  /// their own sd.
   [[nodiscard]] bool honest() const;
 
  private:

@@ -269,6 +269,24 @@ Vector3d NavigationFilter::mean_rate(std::size_t centre, std::size_t half_width)
   return sum / static_cast<double>(2 * half_width + 1);
 }
 
+/// E-5a, at an instant that lies by a share of the interval behind epoch k.
+InertialRates NavigationFilter::measured_between(std::size_t k, double share_of_newer) const noexcept {
+  const InertialRates& before = past(k).measured;
+  const InertialRates& after = past(k - 1).measured;
+  if (k < 2 || k + 1 >= past_size_) return mixed(before, after, share_of_newer);
+  const double s = share_of_newer;
+  const std::array<double, 4> weights{-s * (1.0 - s) * (2.0 - s) / 6.0,
+                                      (1.0 + s) * (1.0 - s) * (2.0 - s) / 2.0,
+                                      (1.0 + s) * s * (2.0 - s) / 2.0, -(1.0 + s) * s * (1.0 - s) / 6.0};
+  InertialRates sum;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const InertialRates& one = past(k + 1 - i).measured;
+    sum.omega_ib_b_radps += weights[i] * one.omega_ib_b_radps;
+    sum.f_b_mps2 += weights[i] * one.f_b_mps2;
+  }
+  return sum;
+}
+
 /// E-29, at an instant that lies by a share of the interval behind epoch k.
 void NavigationFilter::set_arm_rate(std::size_t k, double share_of_newer, Delayed& out) const noexcept {
   const Vector3d& bias = out.state.gyro_bias_b_radps;
@@ -544,7 +562,7 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
     if (k > 0) {
       const PastEpoch& after = past(k - 1);
       share_of_newer = rest_s / to_seconds(after.time - epoch.time);
-      out.measured = mixed(epoch.measured, after.measured, share_of_newer);
+      out.measured = measured_between(k, share_of_newer);
     }
     propagate(out.state, increment_from_samples(compensated(epoch.measured, out.state),
                                                 compensated(out.measured, out.state), rest_s));

@@ -77,6 +77,7 @@ class NavigationFilter {
   void predict_biases_only(double dt_s) noexcept;
   void remember(const Sample& sample, const InertialRates& measured) noexcept;
   [[nodiscard]] Eigen::Vector3d mean_rate(std::size_t centre, std::size_t half_width) const noexcept;
+  [[nodiscard]] InertialRates measured_between(std::size_t k, double share_of_newer) const noexcept;
   void set_arm_rate(std::size_t k, double share_of_newer, Delayed& out) const noexcept;
   void try_start(const Sample& sample) noexcept;
   void start(const NavigationState& state, const NavigationErrorVector& sd, InitialisationMethod method,
