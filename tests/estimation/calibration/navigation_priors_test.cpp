@@ -218,5 +218,53 @@ TEST(Antenna, ArmIsNotShortenedByTheNoiseOfTheGyros) {
   EXPECT_LT(std::abs(along_m), 0.03);
 }
 
+/// A rough road swings the antenna by up to 15 Hz, and receivers know nothing of the reference's instants: half way
+/// between two of them a line through its rates has a tenth of such a swing too little, and the arm would be as much too
+/// long.
+TEST(Antenna, ArmIsNotMadeLongerByARoughRoad) {
+  const Vector3d arm_b_m(-0.5, 0.2, -1.3);
+  constexpr double kAgo_s = 0.025;
+  imusim::Scenario scenario;
+  scenario.duration_s = 400.0;
+  scenario.rough_road_to_hz = imusim::kWheelHop_hz;
+  const imusim::Motion rough(scenario);
+  SimulatedDrive drive(scenario.duration_s, {}, 700);
+  EstimatorConfig config = drive.config();
+  config.gnss.antenna_lever_arm_b_m = to_array(arm_b_m);
+  std::mt19937 random(92);
+  std::normal_distribution<> normal;
+  Estimator estimator(config);
+  run_changed(drive, estimator, [&](Sample& sample, const imusim::MotionState& smooth) {
+    const imusim::MotionState now = rough.state_at(smooth.t_s);
+    if (sample.kind == SampleKind::kImu) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto axis = static_cast<Eigen::Index>(i);
+        sample.imu.omega_radps[i] += now.omega_ib_b_radps[axis] - smooth.omega_ib_b_radps[axis];
+        sample.imu.f_mps2[i] += now.f_b_mps2[axis] - smooth.f_b_mps2[axis];
+      }
+    } else if (sample.kind == SampleKind::kGnss) {
+      const imusim::MotionState then = rough.state_at(smooth.t_s - kAgo_s);
+      sample.time -= from_seconds(kAgo_s);
+      const GeodeticPosition at =
+          displaced({then.position.latitude_rad, then.position.longitude_rad, then.position.height_m},
+                    then.C_b_n * arm_b_m + 0.01 * Vector3d(normal(random), normal(random), normal(random)));
+      sample.gnss.latitude_rad = at.latitude_rad;
+      sample.gnss.longitude_rad = at.longitude_rad;
+      sample.gnss.height_m = at.height_m;
+      Vector3d v_n_mps = then.v_n_mps + then.C_b_n * then.omega_nb_b_radps.cross(arm_b_m);
+      for (double& v : v_n_mps) v += 0.02 * normal(random);
+      sample.gnss.v_n_mps = to_array(v_n_mps);
+      sample.gnss.flags |= kVelocityValid;
+    }
+  });
+  const NavigationOutput& out = estimator.navigation();
+  ASSERT_EQ(out.status, NavigationStatus::kNavigating);
+  const Vector3d error_m = to_eigen(out.antenna_lever_arm_b_m) - arm_b_m;
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_LT(std::abs(error_m[static_cast<Eigen::Index>(i)]), 3.3 * out.sd_antenna_lever_arm_m[i]) << i;
+  EXPECT_LT(out.sd_antenna_lever_arm_m[2], 0.01);
+  EXPECT_LT(error_m.norm(), 0.006) << error_m.transpose();  // by a line 14 mm
+}
+
 }  // namespace
 }  // namespace imuscope::test
