@@ -148,6 +148,8 @@ imuscope::EstimatorConfig configure(const Scenario& scenario, const imusim::Moti
                                     const Options& options, imusim::Random& random) {
   imuscope::EstimatorConfig config = standard_drive::configuration(motion, options.reference_class);
   config.reference.differentiator_points = options.points;
+  if (options.world == imusim::WorldKind::kHarsh)  // as the program takes it from the noise that it is told
+    config.reference.grade = imuscope::reference_grade(config.reference.gyro_white_radps_per_sqrt_hz);
   // True = estimate (+) error, with the error drawn about NED.
   const Vector3d phi = normal3(random).cwiseProduct(kAttitudeSd_rad);
   const Matrix3d C_b_n = motion.state_at(0.0).C_b_n;
