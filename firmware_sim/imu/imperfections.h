@@ -30,13 +30,13 @@ struct Imperfections {
   double g_sensitivity_sd_s_per_m = 0.0;  ///< each element, rad/s per m/s^2
   double scale_sd = 0.0;                  ///< on top of the scale that the class has already
   double delay_apart_sd_s = 0.0;          ///< accelerometers later than gyros
-  double low_pass_hz = std::numeric_limits<double>::infinity();  ///< of both triads, each with
-  double low_pass_sd = 0.0;                                      ///< a corner of its own, off by this share
-  double stated_delay_s = 0.0;  ///< of both triads, which the maker's time stamps take off
+  double low_pass_hz = std::numeric_limits<double>::infinity();  ///< of both triads
+  double low_pass_sd = 0.0;     ///< of each triad's own corner, as a share of it
+  double stated_delay_s = 0.0;  ///< of both triads, taken off the time stamps by the maker
   double own_vibration = 0.0;   ///< what its mount adds, as a share of the vehicle's vibration
 };
 
-/// An MTx class sensor: 0.1 deg, 2 cm, 0.05 deg/s/g, 1 ms, 40 Hz (4 Hz), half of the vehicle's vibration.
+/// An MTx class sensor: 0.1 deg, 2 cm, 0.05 deg/s/g, 1 ms, 40 Hz with an sd of a tenth, half of the vehicle's vibration.
 Imperfections study_imperfections(WorldKind world);
 /// The R-IMU: scale, misalignment and bandwidth as makers of its class of gyros state them, time stamps from which
 /// the delay of such a low-pass is taken off, a quarter of the vehicle's vibration.

@@ -293,11 +293,11 @@ TEST(Motion, AShortDriveStillMovesAfterTenSeconds) {
   EXPECT_LT(motion.state_at(59.9).v_n_mps.norm(), 1e-12);
 }
 
-/// Mean square over the drive of the second difference over 1/60 s: a sine of 15 Hz counts twice, one of 1 Hz by
-/// 0.01 of its amplitude. And that of the value itself.
+/// Mean squares over the drive.
 struct Shaking {
-  double fast = 0.0;
-  double whole = 0.0;
+  double fast =
+      0.0;  ///< of what differs from its neighbours 1/60 s away: all of 15 Hz, of 1 Hz 0.005 of the amplitude
+  double whole = 0.0;  ///< of the value itself
 };
 Shaking shaking_of(const Motion& motion, double (*value)(const MotionState&)) {
   constexpr double kQuarter_s = 1.0 / 60.0;

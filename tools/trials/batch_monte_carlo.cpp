@@ -59,7 +59,7 @@ constexpr std::array<Kind, 13> kKinds{{{"psi", batch::kPsi, 3},
                                        {"accel scale", batch::kAccelShape, 3},
                                        {"accel axes", batch::kAccelShape + 3, 3},
                                        {"accel delay", batch::kAccelDelay, 1},
-                                       {"its reference's", batch::kReferenceAccelDelay, 1},
+                                       {"ref. delay", batch::kReferenceAccelDelay, 1},
                                        {"accel places", batch::kPlaces, 6},
                                        {"g-sensitivity", batch::kGSensitivity, 9}}};
 
@@ -190,15 +190,12 @@ class Results {
   std::mutex mutex_;
 };
 
-/// Above this the estimate trusts no body to be rigid.
-constexpr double kUsed_hz = 8.0;
-
 using Variances6 = Eigen::Matrix<double, 6, 1>;
 
 /// Posterior Cramer-Rao bound of (psi, r): variances that the same states and priors have where the motion is
 /// as it was, the noise is known and everything is linear and Gaussian, and what the reference's own axes add to them. A Kalman filter tells just these; its
 /// covariance hangs on the motion and hardly on the draw, so that one run does. Of a rough road it has what shakes
-/// below the frequency up to which the estimate trusts a body to be rigid. Where the reference is as
+/// below kTop_hz, where the estimate ends. Where the reference is as
 /// noisy as the sensors (class 5), the filter's windows lose a little, and the bound is an upper one.
 Variances6 bound_of(const standard_drive::Truth& truth, const Options& options) {
   const int reference_class = options.pair.reference_class;
@@ -231,7 +228,7 @@ Variances6 bound_of(const standard_drive::Truth& truth, const Options& options) 
   drawn.reference_class = reference_class;
   drawn.mtx.gyro_noise = imusim::GyroNoiseChoice::kAllDynamic;
   imusim::Scenario same_drive;
-  if (options.pair.world == imusim::WorldKind::kHarsh) same_drive.rough_road_to_hz = kUsed_hz;
+  if (options.pair.world == imusim::WorldKind::kHarsh) same_drive.rough_road_to_hz = batch::kTop_hz;
   const standard_drive::Truth ideal(same_drive, options.duration_s);
   standard_drive::Instruments instruments(ideal, standard_drive::draw(drawn, random, options.first),
                                           options.first);

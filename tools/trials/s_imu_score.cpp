@@ -109,10 +109,11 @@ std::string SImuScore::table() const {
 }
 
 bool SImuScore::honest() const {
+  if (n_ == 0) return false;
   // A sensor's components share a drive: they count as one.
   const double nees_off = imuscope::kOwnSd * std::sqrt(12.0 / n_);
   const double coverage_off = imuscope::kOwnSd * std::sqrt(0.95 * 0.05 / n_);
-  if (n_ == 0 || nees6() < kNeesLow - nees_off || nees6() > kNeesHigh + nees_off) return false;
+  if (nees6() < kNeesLow - nees_off || nees6() > kNeesHigh + nees_off) return false;
   for (const Kind& kind : kinds_) {
     if (kind.score.n() == 0) continue;
     const double inside = kind.score.coverage();

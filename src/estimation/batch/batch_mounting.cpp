@@ -22,8 +22,6 @@ namespace {
 
 using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
 
-/// Above this neither filter of the sensors nor body is to be trusted, and vibration rules.
-constexpr double kTop_hz = 8.0;
 /// A band's first sd of deviation, before it is learned.
 constexpr double kFirstDeviation = 0.01;
 constexpr double kLeastDeviation = 1e-5;

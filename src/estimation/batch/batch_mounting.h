@@ -46,6 +46,9 @@ struct LimitShares {
   }
 };
 
+/// Above this neither filter of the sensors nor body is to be trusted, and vibration rules: the estimate ends here.
+inline constexpr double kTop_hz = 8.0;
+
 /// The result. (psi, r) of `covariance` as everywhere: psi in b, C = C^ Exp(-psi).
 struct BatchMounting {
   SensorState sensor;  ///< biases are those of the middle of the record

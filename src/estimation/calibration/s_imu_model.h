@@ -2,7 +2,7 @@
 
 /// The measurement model of one S-IMU: what it should show, given the reference, and how that changes with
 /// every state. Truth = estimate + error, except the boresight: C_b_s = C^_b_s Exp(-psi), psi in b.
-/// EQUATIONS.md C-1 to C-12, C-16, C-18 to C-20, C-23, C-26, C-16a. Core: no allocation.
+/// EQUATIONS.md C-1 to C-12, C-16, C-16a, C-18 to C-20, C-23, C-26. Core: no allocation.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -33,7 +33,8 @@ struct SImuState {
   /// Where the accelerometers are about their middle, by place_basis(), m.
   Eigen::Matrix<double, 6, 1> places_s_m = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix3d g_sensitivity = Eigen::Matrix3d::Zero();  ///< rad/s per m/s^2
-  double reference_accel_t_d_s = 0.0;  ///< R-IMU: its forces at t are those at t plus this of its rates' time
+  /// Of the R-IMU's accelerometers against its gyros, signed as accel_t_d_s.
+  double reference_accel_t_d_s = 0.0;
 };
 
 /// Where the states of one S-IMU stand in the filter's error state.
@@ -108,7 +109,8 @@ struct ReferenceBiasColumns {
                                                const ReferenceNoise& noise) noexcept;
 
 /// z_f,i = [B C A (f + M (r + C' d_i))]_i + b_a, B = I + diag(s_a) + E_a, `b` compensated, at t + t_d +
-/// accel_t_d, M, as of the reference's rates, later by reference_accel_t_d. C-7 to C-11, C-16, C-18, C-19, C-16a.
+/// accel_t_d, with M = [w x][w x] + [w' x], of the reference's rates, later by reference_accel_t_d. C-7 to C-11, C-16,
+/// C-16a, C-18, C-19.
 [[nodiscard]] SImuMeasurement accel_measurement(const SImuState& state, const SImuLayout& layout,
                                                 const ReferenceBiasColumns& reference, const ReferenceMean& b,
                                                 const ReferenceMean& for_H,

@@ -195,7 +195,7 @@ TEST(EstimateMounting, IsNotMisledByABodyThatShakesFasterThanTheGridShows) {
 
 /// A second-order low-pass is later for fast motion than for slow.
 TEST(EstimateMounting, TellsALowPassFromADelay) {
-  for (int seed = 0; seed < 2; ++seed) {
+  for (int seed = 0; seed < 3; ++seed) {
     PairOptions truth = crooked();
     truth.road_rate = 5e-3;
     truth.study_low_pass_hz = 40.0;

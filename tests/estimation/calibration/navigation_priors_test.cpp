@@ -175,6 +175,19 @@ TEST(ReferenceAxes, ThatAreCrookedMakeNoNavigationTooSure) {
   position.expect_not_too_sure("position");
 }
 
+/// A fix of 2 cm/s whose antenna lies at `arm_b_m` of a vehicle that moves so.
+void show_antenna(const GeodeticPosition& at, const imusim::MotionState& motion, const Vector3d& arm_b_m,
+                  std::mt19937& random, GnssData& gnss) {
+  std::normal_distribution<> normal;
+  gnss.latitude_rad = at.latitude_rad;
+  gnss.longitude_rad = at.longitude_rad;
+  gnss.height_m = at.height_m;
+  Vector3d v_n_mps = motion.v_n_mps + motion.C_b_n * motion.omega_nb_b_radps.cross(arm_b_m);
+  for (double& v : v_n_mps) v += 0.02 * normal(random);
+  gnss.v_n_mps = to_array(v_n_mps);
+  gnss.flags |= kVelocityValid;
+}
+
 /// The swing of the antenna is seen through the rate: noise of an MTx in it would shorten the arm by a sixth.
 TEST(Antenna, ArmIsNotShortenedByTheNoiseOfTheGyros) {
   constexpr int kDrives = 6;
@@ -198,13 +211,7 @@ TEST(Antenna, ArmIsNotShortenedByTheNoiseOfTheGyros) {
         const GeodeticPosition at =
             displaced({sample.gnss.latitude_rad, sample.gnss.longitude_rad, sample.gnss.height_m},
                       truth.C_b_n * arm_b_m);
-        sample.gnss.latitude_rad = at.latitude_rad;
-        sample.gnss.longitude_rad = at.longitude_rad;
-        sample.gnss.height_m = at.height_m;
-        Vector3d v_n_mps = truth.v_n_mps + truth.C_b_n * truth.omega_nb_b_radps.cross(arm_b_m);
-        for (double& v : v_n_mps) v += 0.02 * normal(random);
-        sample.gnss.v_n_mps = to_array(v_n_mps);
-        sample.gnss.flags |= kVelocityValid;
+        show_antenna(at, truth, arm_b_m, random, sample.gnss);
       }
     });
     const NavigationOutput& out = estimator.navigation();
@@ -248,13 +255,7 @@ TEST(Antenna, ArmIsNotMadeLongerByARoughRoad) {
       const GeodeticPosition at =
           displaced({then.position.latitude_rad, then.position.longitude_rad, then.position.height_m},
                     then.C_b_n * arm_b_m + 0.01 * Vector3d(normal(random), normal(random), normal(random)));
-      sample.gnss.latitude_rad = at.latitude_rad;
-      sample.gnss.longitude_rad = at.longitude_rad;
-      sample.gnss.height_m = at.height_m;
-      Vector3d v_n_mps = then.v_n_mps + then.C_b_n * then.omega_nb_b_radps.cross(arm_b_m);
-      for (double& v : v_n_mps) v += 0.02 * normal(random);
-      sample.gnss.v_n_mps = to_array(v_n_mps);
-      sample.gnss.flags |= kVelocityValid;
+      show_antenna(at, then, arm_b_m, random, sample.gnss);
     }
   });
   const NavigationOutput& out = estimator.navigation();
