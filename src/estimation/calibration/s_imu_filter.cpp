@@ -7,6 +7,7 @@
 
 #include "estimation/calibration/axis_gate.h"
 #include "estimation/calibration/finite_imu.h"
+#include "estimation/calibration/reference_axes.h"
 #include "estimation/navigation/so3.h"
 
 namespace imuscope {
@@ -52,6 +53,34 @@ Matrix3d block_of(const CovarianceKernel& P, std::size_t row, std::size_t column
   return out;
 }
 
+using ThreeRows = Eigen::Matrix<double, 3, kAxesErrors>;
+
+AffectedCovariance affected_by_axes(const CovarianceKernel& P, const SImuLayout& layout) {
+  const std::array<std::size_t, affected::kSize / 3> blocks = {
+      layout.psi,         layout.r,          layout.gyro_scale,     layout.gyro_axes,
+      layout.accel_scale, layout.accel_axes, layout.accel_boresight};
+  AffectedCovariance out;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    for (std::size_t j = 0; j < blocks.size(); ++j)
+      out.block<3, 3>(3 * static_cast<Eigen::Index>(i), 3 * static_cast<Eigen::Index>(j)) =
+          block_of(P, blocks[i], blocks[j]);
+  }
+  return out;
+}
+
+/// Zero where a state is absent.
+TakenUpSd prior_of_axes(const SImuConfig& config, const SImuLayout& layout) {
+  const auto known = [](std::size_t first, const Vector3d& sd) {
+    return first == SImuLayout::kAbsent ? Vector3d(Vector3d::Zero()) : sd;
+  };
+  const Vector3d leans = Vector3d::Constant(config.prior_axes_sd_rad);
+  TakenUpSd sd;
+  sd << known(layout.gyro_scale, to_eigen(config.prior_gyro_scale_sd)), known(layout.gyro_axes, leans),
+      known(layout.accel_scale, to_eigen(config.prior_accel_scale_sd)), known(layout.accel_axes, leans),
+      known(layout.accel_boresight, to_eigen(config.prior_accel_boresight_sd_rad));
+  return sd;
+}
+
 /// C-17: one process for a constant and a wandering part: the variance of both, and as fast at first as the
 /// wandering one.
 std::array<GaussMarkovConfig, 3> with_turn_on(const std::array<GaussMarkovConfig, 3>& slow,
@@ -90,8 +119,7 @@ SImuFilter::SImuFilter(const EstimatorConfig& config, std::size_t index)
       gate_(axis_gate(config.gate_probability)),
       rate_noise_radps_(config.reference.gyro_white_radps_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
       force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
-      reference_scale_sd_(config.reference.grade.scale_sd),
-      reference_triad_sd_rad_(config.reference.grade.triad_sd_rad),
+      reference_grade_(config.reference.grade),
       increment_centre_(from_seconds(0.5 / config_.rate_hz)),
       has_biases_((config_.blocks & kBiasSImuBlocks) == kBiasSImuBlocks),
       queue_(waiting_samples_capacity(config_.rate_hz)),
@@ -631,11 +659,14 @@ void SImuFilter::update_output(const FilterCore& core, EventLog& log) noexcept {
   output_.sd_accel_t_d_s = core.sd(layout.accel_t_d);
   output_.sd_t_d_s = core.sd(layout.t_d);
 
-  // C-21: what nobody can tell from the motion.
   if (layout.accel_boresight != SImuLayout::kAbsent) {
     for (std::size_t i = 0; i < 3; ++i) {
-      output_.sd_gyro_scale[i] = std::hypot(output_.sd_gyro_scale[i], reference_scale_sd_, kLowPassShare);
-      output_.sd_accel_scale[i] = std::hypot(output_.sd_accel_scale[i], reference_scale_sd_, kLowPassShare);
+      const auto k = static_cast<Eigen::Index>(i);
+      // C-21
+      output_.sd_gyro_scale[i] =
+          std::hypot(output_.sd_gyro_scale[i], gyro_scale_by_reference_(k), kLowPassShare);
+      output_.sd_accel_scale[i] =
+          std::hypot(output_.sd_accel_scale[i], accel_scale_by_reference_(k), kLowPassShare);
     }
   }
   const MountingMonitor::Verdict verdict = monitor_.judge(output_, layout);
@@ -676,7 +707,7 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
   const Matrix3d turned = by_axes * block(layout.gyro_axes, layout.psi);
   Matrix3d psi = block(layout.psi, layout.psi) + turned + turned.transpose() +
                  by_axes * block(layout.gyro_axes, layout.gyro_axes) * by_axes.transpose();
-  const Matrix3d psi_r = block(layout.psi, layout.r) + by_axes * block(layout.gyro_axes, layout.r);
+  Matrix3d psi_r = block(layout.psi, layout.r) + by_axes * block(layout.gyro_axes, layout.r);
   Matrix3d r = block(layout.r, layout.r);
   // C-22: the noise is known to a share, so the lever arm that it takes (1 - s of C-13) is, too.
   const Vector3d attenuated = kNoiseKnown * noise_share_ * state.r_bs_b_m;
@@ -686,7 +717,20 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
   const double beyond_class = monitor_.watch_class(core, index_, config_);
   psi *= beyond_class * beyond_class;
   r *= beyond_class * beyond_class;
-  covariance << psi, beyond_class * beyond_class * psi_r, beyond_class * beyond_class * psi_r.transpose(), r;
+  psi_r *= beyond_class * beyond_class;
+  // C-27
+  const ReferenceColumns F = reference_columns(affected_by_axes(P, layout), prior_of_axes(config_, layout),
+                                               state.C_b_s, reference_grade_);
+  const auto rows = [&F](Eigen::Index state_rows) { return F.middleRows<3>(state_rows); };
+  const ThreeRows F_psi = rows(affected::kPsi) + by_axes * rows(affected::kGyroAxes);
+  psi += F_psi * F_psi.transpose();
+  psi_r += F_psi * rows(affected::kR).transpose();
+  r += rows(affected::kR) * rows(affected::kR).transpose();
+  if (layout.accel_boresight != SImuLayout::kAbsent && layout.r != SImuLayout::kAbsent)
+    r.diagonal() += r_by_scale_m2(state.r_bs_b_m, reference_grade_);
+  gyro_scale_by_reference_ = rows(affected::kGyroScale).rowwise().norm();
+  accel_scale_by_reference_ = rows(affected::kAccelScale).rowwise().norm();
+  covariance << psi, psi_r, psi_r.transpose(), r;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     output_.sd_psi_rad[i] = std::sqrt(psi(k, k));
@@ -706,12 +750,13 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
   const Matrix3d mixed = (alpha_a - alpha_g) * by_axes.transpose();
   const Matrix3d alpha = block(layout.accel_boresight, layout.accel_boresight) + mixed + mixed.transpose() +
                          by_axes * (a_a + g_g - g_a - g_a.transpose()) * by_axes.transpose();
+  const ThreeRows F_alpha =
+      rows(affected::kAccelBoresight) + by_axes * (rows(affected::kAccelAxes) - rows(affected::kGyroAxes));
   for (std::size_t i = 0; i < 3; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    // C-21
     output_.sd_accel_boresight_rad[i] = layout.accel_boresight == SImuLayout::kAbsent
                                             ? 0.0
-                                            : std::hypot(std::sqrt(alpha(k, k)), reference_triad_sd_rad_);
+                                            : std::sqrt(alpha(k, k) + F_alpha.row(k).squaredNorm());
   }
 }
 

@@ -102,8 +102,9 @@ class SImuFilter {
   double gate_;              ///< bound of y^2 / S of one axis
   double rate_noise_radps_;  ///< of one R sample
   double force_noise_mps2_;
-  double reference_scale_sd_;
-  double reference_triad_sd_rad_;
+  ReferenceGrade reference_grade_;
+  Eigen::Vector3d gyro_scale_by_reference_ = Eigen::Vector3d::Zero();  ///< sd, C-27
+  Eigen::Vector3d accel_scale_by_reference_ = Eigen::Vector3d::Zero();
   Duration increment_centre_;  ///< half a sample period
   /// Without bias states (the paper's filter) S biases would pass for R biases and for outliers: the R biases
   /// are then left alone, as in the paper's eq. (5), and nothing is gated.
