@@ -131,13 +131,18 @@ endfunction()
 
 # imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds] [SLOW] [ALONE])
 # One GoogleTest program; every test case is a CTest test of its own. SLOW: left out by tools/test --quick.
-# ALONE: runs in real time, so that no other test may run beside it.
+# ALONE: runs in real time, so that no other of these may run beside it, and others only at the lowest priority; left
+# out by --quick, too.
 function(imuscope_test name)
   cmake_parse_arguments(ARG "SLOW;ALONE" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
-  # Counters and sanitizers slow a program down; what hangs is still found.
+  # Others have the processor first; what hangs is still found.
+  if(NOT ARG_ALONE)
+    math(EXPR ARG_TIMEOUT "3 * ${ARG_TIMEOUT}")
+  endif()
+  # Counters and sanitizers slow a program down.
   if(NOT CMAKE_BUILD_TYPE STREQUAL "Release")
     math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
   endif()
@@ -145,11 +150,10 @@ function(imuscope_test name)
     math(EXPR ARG_TIMEOUT "20 * ${ARG_TIMEOUT}")  # emulated
   endif()
   set(labels)
-  if(ARG_SLOW)
-    set(labels LABELS slow)
-  endif()
   if(ARG_ALONE)
-    list(APPEND labels RUN_SERIAL TRUE)
+    set(labels LABELS alone RUN_SERIAL TRUE)
+  elseif(ARG_SLOW)
+    set(labels LABELS slow)
   endif()
   if(IMUSCOPE_SANITIZE STREQUAL "thread")
     list(APPEND labels ENVIRONMENT TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan.supp)
