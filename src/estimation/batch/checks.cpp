@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "base/units.h"
 #include "estimation/alignment/cross_correlation.h"
@@ -26,7 +27,7 @@ constexpr double kUnitRatio = 20.0;
 constexpr double kUnitTolerance = 0.3;
 /// |omega| that varies by this (half a degree a second) is motion.
 constexpr double kMotionMin_radps = 0.01;
-/// Over so long |omega| is averaged before that is looked at: white noise is less than motion then.
+/// Over so long |omega| and forces are averaged before they are looked at: white noise is less than motion then.
 constexpr double kAveraged_s = 0.5;
 /// Below this the two do not turn alike; the worst real pair on one vehicle has 0.98.
 constexpr double kCorrelationMin = 0.7;
@@ -34,8 +35,10 @@ constexpr double kCorrelationMin = 0.7;
 constexpr double kCopyShare = 1e-6;
 /// What a vehicle's accelerometers show in the mean is gravity: a third of it is no bias any more.
 constexpr double kGravityTolerance = 1.0 / 3.0;
-/// Mean forces further apart than this are no biases: 0.5 m/s^2 of them make 3 degrees.
-constexpr double kMeanForceMin = 0.94;  // 20 degrees
+/// Of the forces of an upright body in g, half-second means are this near to one; of one that lies or accelerates, most.
+constexpr double kGravityInG = 0.1;
+/// Mean forces further apart than this, in g, are no biases: a third is gravity of 20 degrees.
+constexpr double kMeanForceGapMax_g = 0.35;
 /// A direction in which the two agree by this at some rotation has something to say.
 constexpr double kSaysSomething = 0.5;
 /// It loses less than this to noise, biases and a lever arm at the rotation that suits all.
@@ -60,20 +63,26 @@ Error wrong(std::string what, std::string remedy) {
   return Error{ErrorKind::kUsage, std::move(what), std::move(remedy)};
 }
 
+/// Calls f(first sample, how many) for every kAveraged_s; a shorter record is one piece.
+template <typename Function>
+void for_each_piece(const ImuRecord& record, Function f) {
+  const auto piece = std::clamp<std::size_t>(static_cast<std::size_t>(kAveraged_s / sample_period_s(record)),
+                                             1, record.size());
+  for (std::size_t first = 0; first + piece <= record.size(); first += piece) f(first, piece);
+}
+
 /// sd of |omega|, averaged over kAveraged_s.
 double spread(const ImuRecord& record, const std::vector<double>& magnitudes) {
-  const auto piece =
-      std::max<std::size_t>(1, static_cast<std::size_t>(kAveraged_s / sample_period_s(record)));
   double sum = 0.0;
   double squares = 0.0;
   double n = 0.0;
-  for (std::size_t first = 0; first + piece <= magnitudes.size(); first += piece) {
+  for_each_piece(record, [&](std::size_t first, std::size_t piece) {
     double value = 0.0;
     for (std::size_t i = first; i < first + piece; ++i) value += magnitudes[i] / static_cast<double>(piece);
     sum += value;
     squares += value * value;
     n += 1.0;
-  }
+  });
   return n > 0.0 ? std::sqrt(std::max(0.0, squares / n - sum * sum / (n * n))) : 0.0;
 }
 
@@ -107,15 +116,27 @@ Result<void> nothing_is_stuck(const ImuRecord& record, const char* whose) {
   return {};
 }
 
+/// Sizes of the forces, averaged over kAveraged_s: gravity's, however the body lies, but for what accelerates it.
+std::vector<double> slow_forces_mps2(const ImuRecord& record) {
+  std::vector<double> sizes;
+  for_each_piece(record, [&](std::size_t first, std::size_t n) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = first; i < first + n; ++i) sum += record.f_mps2[i].cast<double>();
+    sizes.push_back(sum.norm() / static_cast<double>(n));
+  });
+  return sizes;
+}
+
 /// In the mean a vehicle's accelerometers show gravity.
 Result<void> shows_gravity(const ImuRecord& record, const char* whose) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const auto& f : record.f_mps2) sum += f.cast<double>();
-  const double mean_mps2 = sum.norm() / static_cast<double>(record.size());
+  const std::vector<double> sizes = slow_forces_mps2(record);
+  const auto n = static_cast<double>(sizes.size());
+  const double mean_mps2 = std::accumulate(sizes.begin(), sizes.end(), 0.0) / n;
   if (std::abs(mean_mps2 / kMps2PerG - 1.0) < kGravityTolerance) return {};
+  const auto ones = std::ranges::count_if(sizes, [](double f) { return std::abs(f - 1.0) < kGravityInG; });
   return tl::unexpected(
       wrong(fmt::format("{} forces are {:.3g} m/s^2 in the mean, which should be gravity", whose, mean_mps2),
-            std::abs(mean_mps2 - 1.0) < kGravityTolerance
+            static_cast<double>(ones) > 0.5 * n
                 ? "they are in g and read as m/s^2: correct accel_unit"
                 : "check accel_unit and accel_columns; forces without gravity are of no use here"));
 }
@@ -148,10 +169,10 @@ Result<void> triads_agree(const PairMoments& moments, const Eigen::Matrix3d& C_b
         "an accelerometer has the wrong sign, two are swapped, or forces are upside down (at rest, with z "
         "down, it shows -9.8): correct axes and accel_columns"));
   }
-  const double cosine = moments.mean_force_cosine(C_b_s);
+  const double gap_g = moments.mean_force_gap_mps2(C_b_s) / kMps2PerG;
   const double lost = std::max(moments.rates.most_lost(C_b_s, kSaysSomething),
                                moments.forces.most_lost(C_b_s, kSaysSomething));
-  if (cosine > kMeanForceMin && lost < kLostAtMost) return {};
+  if (gap_g < kMeanForceGapMax_g && lost < kLostAtMost) return {};
   const Eigen::AngleAxisd between(moments.forces_with_gravity.best_rotation() *
                                   moments.rates.best_rotation().transpose());
   return tl::unexpected(wrong(

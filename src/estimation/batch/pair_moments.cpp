@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/units.h"
+
 namespace imuscope::batch {
 
 namespace {
@@ -118,12 +120,14 @@ PairMoments::PairMoments(const Grid& reference, const Grid& study) {
 
 // B-18: rates, forces and mean forces together
 Matrix3d PairMoments::common_rotation() const {
-  const Matrix3d gravity = mean_force_s_.normalized() * mean_force_b_.normalized().transpose();
+  // The mean of a body that is laid on its sides is of no direction.
+  const double size = std::min(1.0, mean_force_s_.norm() * mean_force_b_.norm() / (kMps2PerG * kMps2PerG));
+  const Matrix3d gravity = size * mean_force_s_.normalized() * mean_force_b_.normalized().transpose();
   return rotation_of(scaled(rates) + scaled(forces) + gravity);
 }
 
-double PairMoments::mean_force_cosine(const Matrix3d& C_b_s) const {
-  return mean_force_s_.normalized().dot(C_b_s * mean_force_b_.normalized());
+double PairMoments::mean_force_gap_mps2(const Matrix3d& C_b_s) const {
+  return (mean_force_s_ - C_b_s * mean_force_b_).norm();
 }
 
 }  // namespace imuscope::batch

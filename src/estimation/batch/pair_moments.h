@@ -34,10 +34,11 @@ class PairMoments {
  public:
   PairMoments(const Grid& reference, const Grid& study);
 
-  /// One rotation for rates, forces about their means, and mean forces, each with the same weight.
+  /// One rotation for rates, forces about their means, and mean forces, each with the same weight; the last with less
+  /// where they are smaller than gravity, as the body lay now this way, now that.
   [[nodiscard]] Eigen::Matrix3d common_rotation() const;
-  /// Cosine of the angle between the mean forces at a rotation.
-  [[nodiscard]] double mean_force_cosine(const Eigen::Matrix3d& C_b_s) const;
+  /// How far the mean forces are apart at a rotation.
+  [[nodiscard]] double mean_force_gap_mps2(const Eigen::Matrix3d& C_b_s) const;
 
   TriadMoments rates;                ///< about their means
   TriadMoments forces;               ///< about their means

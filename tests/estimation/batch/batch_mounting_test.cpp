@@ -72,6 +72,28 @@ TEST(EstimateMounting, FindsACrookedSensorWithinItsSd) {
     near(found->sensor.x[kGyroBias + i], truth.gyro_bias[i], found->sd(kGyroBias, i));
 }
 
+/// Without a drive: what a bench has, or a user who turns the vehicle's sensor plate by hand.
+TEST(EstimateMounting, FindsACrookedSensorThatIsLaidOnItsSidesWithinItsSd) {
+  PairOptions truth = crooked();
+  truth.laid_on_sides = true;
+  truth.reference_gyro_white = 1e-6;  // navigation grade, whose own axes limit nothing
+  truth.reference_accel_white = 1e-4;
+  constexpr int kRecords = 4;
+  double sum = 0.0;
+  for (std::uint64_t seed = 1; seed <= kRecords; ++seed) {
+    const auto pair = make_pair(truth, seed);
+    const auto found = estimate_mounting(pair.reference, pair.study);
+    ASSERT_TRUE(found) << found.error().text();
+    expect_within_its_sd(*found, truth);
+    sum += nees(*found, truth);
+    // All axes turn, and gravity comes along each: what is left is the reference's own axes, not the class's 0.05 deg.
+    for (Eigen::Index i = 3; i < 6; ++i)
+      EXPECT_LT(found->sd(kAccelShape, i), 0.5 * 0.05 * imuscope::kRadPerDeg) << i;
+    EXPECT_NEAR(found->sensor.gyro_shape()(2, 0), truth.gyro_matrix(2, 0), 4.0 * found->sd(kGyroShape, 4));
+  }
+  EXPECT_LT(sum / kRecords, 6.0 + 4.0 * std::sqrt(12.0 / kRecords));
+}
+
 /// B-21, against estimates from references that are off by each error in turn.
 TEST(EstimateMounting, KnowsWhatTheReferencesOwnAxesMakeOfIt) {
   BatchOptions options;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "estimation/batch/batch_mounting.h"
+#include "base/units.h"
 #include "estimation/navigation/so3.h"
 #include "synthetic_pair.h"
 
@@ -115,6 +116,18 @@ TEST(FindStart, TellsForcesInGAndForcesWithoutGravity) {
   pair = pair_of();
   for (auto& f : pair.study.f_mps2) f.z() += 9.81F;
   expect_wrong(pair, "forces without gravity");
+}
+
+TEST(FindStart, TakesABodyThatIsLaidOnItsSidesForOneUnderGravity) {
+  PairOptions options;
+  options.laid_on_sides = true;
+  options.C_b_s = imuscope::exp_so3(Eigen::Vector3d(0.5, -0.7, 1.6));
+  Pair pair = make_pair(options, 3);
+  const auto start = find_start(pair.reference, pair.study, 3.0);
+  ASSERT_TRUE(start) << start.error().text();
+  EXPECT_LT(imuscope::log_so3(start->C_b_s * options.C_b_s.transpose()).norm(), 1.0 * imuscope::kRadPerDeg);
+  for (auto& f : pair.study.f_mps2) f /= 9.80665F;
+  expect_wrong(pair, "they are in g");
 }
 
 TEST(FindStart, TellsAnAxisThatShowsOneNumber) {

@@ -348,8 +348,8 @@ TEST(BatchPartsAnswers, PairMoments) {
                m.most_lost(C.cast<double>(), 0.5), m.most_lost(Eigen::Matrix3d::Identity(), 0.2),
                m.best_rotation());
   }
-  lines.line("common", moments.common_rotation(), moments.mean_force_cosine(C.cast<double>()),
-             moments.mean_force_cosine(Eigen::Matrix3d::Identity()));
+  lines.line("common", moments.common_rotation(), moments.mean_force_gap_mps2(C.cast<double>()),
+             moments.mean_force_gap_mps2(Eigen::Matrix3d::Identity()));
   TriadMoments mirrored = moments.rates;
   mirrored.study_reference.row(0) *= -1.0;
   lines.line("mirrored", mirrored.mirrored(), mirrored.best_rotation());

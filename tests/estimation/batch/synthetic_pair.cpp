@@ -1,8 +1,10 @@
 #include "synthetic_pair.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <random>
 #include <span>
 #include <vector>
@@ -20,14 +22,28 @@ struct Sine {
   double phase;
 };
 
+const Vector3d kUpright_mps2(0.0, 0.0, -9.81);
+
+class Body {
+ public:
+  Body() = default;
+  Body(const Body&) = delete;
+  Body& operator=(const Body&) = delete;
+  virtual ~Body() = default;
+  [[nodiscard]] virtual Vector3d omega(double t) const = 0;
+  [[nodiscard]] virtual Vector3d omega_dot(double t) const = 0;
+  [[nodiscard]] virtual Vector3d force(double t) const = 0;
+  [[nodiscard]] virtual Vector3d force_dot(double t) const = 0;
+};
+
 /// Rates below 3 Hz and forces below 4 Hz of a car on a winding, uneven road.
-struct Body {
+struct Car final : Body {
   const Vector3d kAboveAxle_m{0.1, 0.0, -0.5};
   std::array<Sine, 14> rates;
   std::array<Sine, 14> forces;
   std::vector<Sine> road;  ///< rates; the forces that go with them are those of a point above the axle
 
-  Body(const PairOptions& options, std::mt19937_64& random) {
+  Car(const PairOptions& options, std::mt19937_64& random) {
     std::uniform_real_distribution<double> phase(0.0, 6.28);
     std::normal_distribution<double> normal;
     for (std::size_t i = 0; i < rates.size(); ++i) {
@@ -49,13 +65,13 @@ struct Body {
     for (int i = 0; i < 60 && options.hop_rate > 0.0; ++i)
       add_road(options.hop_rate, 1, 5.0 + 0.15 * (i + phase(random) / 6.28), 0.0);
   }
-  [[nodiscard]] Vector3d omega(double t) const { return sum(rates, t, 0) + sum(road, t, 0); }
-  [[nodiscard]] Vector3d omega_dot(double t) const { return sum(rates, t, 1) + sum(road, t, 1); }
-  [[nodiscard]] Vector3d force_dot(double t) const {
+  [[nodiscard]] Vector3d omega(double t) const override { return sum(rates, t, 0) + sum(road, t, 0); }
+  [[nodiscard]] Vector3d omega_dot(double t) const override { return sum(rates, t, 1) + sum(road, t, 1); }
+  [[nodiscard]] Vector3d force_dot(double t) const override {
     return sum(forces, t, 1) + sum(road, t, 2).cross(kAboveAxle_m);
   }
-  [[nodiscard]] Vector3d force(double t) const {
-    return Vector3d(0.0, 0.0, -9.81) + sum(forces, t, 0) + sum(road, t, 1).cross(kAboveAxle_m);
+  [[nodiscard]] Vector3d force(double t) const override {
+    return kUpright_mps2 + sum(forces, t, 0) + sum(road, t, 1).cross(kAboveAxle_m);
   }
 
  private:
@@ -67,6 +83,59 @@ struct Body {
                std::sin(s.omega * t + s.phase + derivative * kQuarter);
     return total;
   }
+};
+
+/// Quarter turns by hand about its own axes, more or less, with rests between them.
+class Laid final : public Body {
+ public:
+  Laid(const PairOptions& options, std::mt19937_64& random) {
+    std::normal_distribution<double> normal;
+    Matrix3d C_b_n = Matrix3d::Identity();
+    for (Eigen::Index i = 0; kTurnEvery_s * static_cast<double>(i) < options.duration_s; ++i) {
+      const Vector3d turn =
+          1.6 * Vector3d::Unit(i % 3) + 0.2 * Vector3d{normal(random), normal(random), normal(random)};
+      turns_.push_back({turn, C_b_n});
+      C_b_n = (C_b_n * rotation(turn)).eval();
+    }
+  }
+  [[nodiscard]] Vector3d omega(double t) const override {
+    const double u = share(t);
+    return 30.0 * u * u * (1.0 - u) * (1.0 - u) / kTurn_s * of(t).turn;
+  }
+  [[nodiscard]] Vector3d omega_dot(double t) const override {
+    const double u = share(t);
+    return 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (kTurn_s * kTurn_s) * of(t).turn;
+  }
+  [[nodiscard]] Vector3d force(double t) const override {
+    const double u = share(t);
+    const double turned = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+    return (of(t).C_b_n * rotation(turned * of(t).turn)).transpose() * kUpright_mps2;
+  }
+  [[nodiscard]] Vector3d force_dot(double t) const override { return force(t).cross(omega(t)); }
+
+ private:
+  static constexpr double kTurnEvery_s = 15.0;
+  static constexpr double kFirst_s = 10.0;
+  static constexpr double kTurn_s = 3.0;
+  struct Turn {
+    Vector3d turn;
+    Matrix3d C_b_n;  ///< before it
+  };
+  static Matrix3d rotation(const Vector3d& turn) {
+    return Eigen::AngleAxisd(turn.norm(),
+                             turn.norm() > 0.0 ? Vector3d(turn.normalized()) : Vector3d(Vector3d::UnitX()))
+        .toRotationMatrix();
+  }
+  [[nodiscard]] std::size_t number(double t) const {
+    return std::min(turns_.size() - 1, static_cast<std::size_t>(std::max(0.0, t / kTurnEvery_s)));
+  }
+  [[nodiscard]] const Turn& of(double t) const { return turns_[number(t)]; }
+  /// 0 before the turn, 1 after it
+  [[nodiscard]] double share(double t) const {
+    return std::clamp((t - kTurnEvery_s * static_cast<double>(number(t)) - kFirst_s) / kTurn_s, 0.0, 1.0);
+  }
+
+  std::vector<Turn> turns_;
 };
 
 class White {
@@ -94,7 +163,7 @@ Shown shown(const Body& body, const PairOptions& o, double t) {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     const Vector3d arm = o.r_bs_b_m + o.C_b_s.transpose() * o.places_s_m.row(axis).transpose();
     const Vector3d force = force_at(body, t + o.accel_delay_s, arm);
-    const Vector3d turn = o.compliance_b * (body.force(t + o.accel_delay_s) - Vector3d(0.0, 0.0, -9.81));
+    const Vector3d turn = o.compliance_b * (body.force(t + o.accel_delay_s) - kUpright_mps2);
     all[3 + axis] = (o.accel_matrix * o.C_b_s * (force + force.cross(turn)))[axis];
   }
   return all;
@@ -142,7 +211,12 @@ double low_pass_delay_s(double corner_hz) { return std::sqrt(2.0) / (2.0 * kFine
 
 Pair make_pair(const PairOptions& o, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  const Body body(o, random);
+  std::unique_ptr<Body> moved;
+  if (o.laid_on_sides)
+    moved = std::make_unique<Laid>(o, random);
+  else
+    moved = std::make_unique<Car>(o, random);
+  const Body& body = *moved;
   Pair pair;
   // The gyros' density in one-sided sense is sqrt(2) the two-sided one; sd of a sample = density sqrt(rate /
   // 2).

@@ -1,6 +1,7 @@
 #pragma once
 
-/// Two IMUs on one body whose motion is a sum of sines, in closed form: rates, their derivative and forces.
+/// Two IMUs on one body whose motion is known in closed form: rates, their derivative and forces. It is a sum of sines,
+/// or turns by hand.
 /// It shares no line with the estimate, and draws what the estimate has to find out.
 
 #include <Eigen/Core>
@@ -35,6 +36,7 @@ struct PairOptions {
   double road_rate = 0.0;          ///< an uneven road's part above 1 Hz, rad/s each of forty lines to 9 Hz
   double hop_rate = 0.0;           ///< the axles' hopping, rad/s each of sixty lines from 5 to 14 Hz
   bool turns = true;               ///< false: the body never turns
+  bool laid_on_sides = false;      ///< instead of all this it is laid by hand on one side after the other
   double lost_share = 0.0;         ///< of the S-IMU's samples, singly
   double study_low_pass_hz = 0.0;  ///< a second-order Butterworth's corner, of all its axes; zero: none
   /// How far the S-IMU's mount turns under other forces than gravity's, in b, rad per m/s^2.
