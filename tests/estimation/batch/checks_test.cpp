@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "estimation/batch/batch_mounting.h"
 #include "base/units.h"
+#include "estimation/batch/batch_mounting.h"
 #include "estimation/navigation/so3.h"
 #include "synthetic_pair.h"
 
