@@ -7,7 +7,6 @@
 
 #include "estimation/calibration/axis_gate.h"
 #include "estimation/calibration/finite_imu.h"
-#include "estimation/calibration/reference_axes.h"
 #include "estimation/navigation/so3.h"
 
 namespace imuscope {
@@ -41,6 +40,9 @@ constexpr double kCoarseOffsetStable_s = 0.02;
 /// The cross-correlation's own sd is optimistic where signals are smooth.
 constexpr double kCoarseOffsetSdFactor = 3.0;
 constexpr Duration kDirectionEvery = std::chrono::seconds{1};
+
+/// theta of C-22 is this times (e_yz, e_xz, e_xy).
+const Vector3d kLeanOfAxes(1.0, -1.0, 1.0);
 
 /// 3 x 3 block of the covariance; zero where either state is absent.
 Matrix3d block_of(const CovarianceKernel& P, std::size_t row, std::size_t column) {
@@ -696,10 +698,8 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
   const CovarianceKernel& P = core.covariance();
   const auto block = [&P](std::size_t row, std::size_t column) { return block_of(P, row, column); };
   // C-22: from the frame that leans to no axis to the one along the x gyro.
-  const Matrix3d sign = Vector3d(1.0, -1.0, 1.0).asDiagonal();
-  const Matrix3d C_t = state.C_b_s.transpose();
-  const Matrix3d by_axes = C_t * sign;
-  const Vector3d gyro_turn = sign * state.gyro_axes;
+  const Matrix3d by_axes = state.C_b_s.transpose() * kLeanOfAxes.asDiagonal();
+  const Vector3d gyro_turn = kLeanOfAxes.cwiseProduct(state.gyro_axes);
   const Matrix3d C_published = exp_so3(-gyro_turn) * state.C_b_s;
   output_.C_b_s = to_array(C_published);
   output_.psi_rad = to_array(Vector3d(-log_so3(to_eigen(output_.C_prior).transpose() * C_published)));
@@ -737,11 +737,20 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
     output_.sd_r_bs_b_m[i] = std::sqrt(r(k, k));
   }
   monitor_.watch_attenuation(attenuated, output_.sd_r_bs_b_m);
+  publish_accel_triad(core, F);
+}
 
+void SImuFilter::publish_accel_triad(const FilterCore& core, const ReferenceColumns& F) noexcept {
+  const SImuState& state = core.study(index_);
+  const SImuLayout& layout = core.layout(index_);
+  const auto block = [&core](std::size_t row, std::size_t column) {
+    return block_of(core.covariance(), row, column);
+  };
   // C-22: alpha, of both triads
-  const Vector3d accel_turn = sign * state.accel_axes;
+  const Matrix3d by_axes = state.C_b_s.transpose() * kLeanOfAxes.asDiagonal();
+  const Vector3d accel_turn = kLeanOfAxes.cwiseProduct(state.accel_axes);
   const Matrix3d C_accel = exp_so3(-accel_turn) * state.C_b_s * state.accel_turn;
-  output_.accel_boresight_rad = to_array(Vector3d(-log_so3(C_published.transpose() * C_accel)));
+  output_.accel_boresight_rad = to_array(Vector3d(-log_so3(to_eigen(output_.C_b_s).transpose() * C_accel)));
   const Matrix3d alpha_g = block(layout.accel_boresight, layout.gyro_axes);
   const Matrix3d alpha_a = block(layout.accel_boresight, layout.accel_axes);
   const Matrix3d g_g = block(layout.gyro_axes, layout.gyro_axes);
@@ -751,7 +760,8 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
   const Matrix3d alpha = block(layout.accel_boresight, layout.accel_boresight) + mixed + mixed.transpose() +
                          by_axes * (a_a + g_g - g_a - g_a.transpose()) * by_axes.transpose();
   const ThreeRows F_alpha =
-      rows(affected::kAccelBoresight) + by_axes * (rows(affected::kAccelAxes) - rows(affected::kGyroAxes));
+      F.middleRows<3>(affected::kAccelBoresight) +
+      by_axes * (F.middleRows<3>(affected::kAccelAxes) - F.middleRows<3>(affected::kGyroAxes));
   for (std::size_t i = 0; i < 3; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     output_.sd_accel_boresight_rad[i] = layout.accel_boresight == SImuLayout::kAbsent

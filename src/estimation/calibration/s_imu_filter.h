@@ -16,6 +16,7 @@
 #include "estimation/calibration/event_log.h"
 #include "estimation/calibration/filter_core.h"
 #include "estimation/calibration/mounting_monitor.h"
+#include "estimation/calibration/reference_axes.h"
 #include "estimation/calibration/update_window.h"
 
 namespace imuscope {
@@ -92,8 +93,9 @@ class SImuFilter {
   void restart_windows() noexcept;
   void set_window_noise() noexcept;
   [[nodiscard]] bool mounting_may_have_moved(const FilterCore& core) noexcept;
-  /// Mounting and accelerometer triad in the frames of their axes. C-22.
+  /// Mounting and accelerometer triad in the frames of their axes. C-22, C-27.
   void publish_mounting(const FilterCore& core) noexcept;
+  void publish_accel_triad(const FilterCore& core, const ReferenceColumns& F) noexcept;
   void precompute_noise() noexcept;
 
   std::size_t index_;
