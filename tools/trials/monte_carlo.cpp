@@ -134,6 +134,7 @@ struct Options {
   std::string names = "KVDSGNL";
   imusim::WorldKind world = imusim::WorldKind::kHarsh;
   int reference_class = 1;
+  bool untold = false;      ///< nobody says what noise the reference has
   int average_samples = 0;  ///< 0: chosen by the filter
   int points = 5;
   bool straight_axes = false;  ///< 19 states, also in the harsh world
@@ -150,6 +151,10 @@ imuscope::EstimatorConfig configure(const Scenario& scenario, const imusim::Moti
   config.reference.differentiator_points = options.points;
   if (options.world == imusim::WorldKind::kHarsh)  // as the program takes it from the noise that it is told
     config.reference.grade = imuscope::reference_grade(config.reference.gyro_white_radps_per_sqrt_hz);
+  if (options.untold) {
+    config.reference = imuscope::ReferenceConfig{.device = config.reference.device, .is_known = false};
+    config.reference.grade = imuscope::reference_grade(imuscope::kIndustrialGyroWhite_radps_per_sqrt_hz);
+  }
   // True = estimate (+) error, with the error drawn about NED.
   const Vector3d phi = normal3(random).cwiseProduct(kAttitudeSd_rad);
   const Matrix3d C_b_n = motion.state_at(0.0).C_b_n;
@@ -416,9 +421,11 @@ int main(int argc, char** argv) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, imusim::WorldKind>{
           {"ideal", imusim::WorldKind::kIdeal}, {"harsh", imusim::WorldKind::kHarsh}}))
       ->default_str("harsh");
-  app.add_option("--reference-class", options.reference_class,
-                 "noise of the reference, which the filter is told: 1 (0.0015 deg/sqrt(h)) to 5 (4.8)")
+  app.add_option(
+         "--reference-class", options.reference_class,
+         "noise of the reference, which the filter is told unless --untold: 1 (0.0015 deg/sqrt(h)) to 5 (4.8)")
       ->check(CLI::Range(1, imusim::kReferenceClasses));
+  app.add_flag("--untold", options.untold, "the filter is not told the reference's noise");
   app.add_option("--average-samples", options.average_samples, "as the configuration's key");
   app.add_option("--points", options.points, "of the differentiator, as the configuration's key");
   const auto* states =

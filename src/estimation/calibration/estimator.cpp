@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/contracts.h"
 #include "estimation/calibration/event_log.h"
@@ -10,6 +11,7 @@
 #include "estimation/calibration/navigation_filter.h"
 #include "estimation/calibration/odometry_filter.h"
 #include "estimation/calibration/regime_detector.h"
+#include "estimation/calibration/resting_noise.h"
 #include "estimation/calibration/s_imu_filter.h"
 #include "estimation/calibration/smoother.h"
 
@@ -45,7 +47,8 @@ class Estimator::Impl final : public EpochSink {
         core_(config),
         window_({config.reference.differentiator_points, 1.0 / config.reference.rate_hz}),
         navigation_(config, core_, log_, counters_),
-        odometry_(config, core_, navigation_, log_, counters_) {
+        odometry_(config, core_, navigation_, log_, counters_),
+        resting_noise_(config.reference.rate_hz) {
     if (history_ != nullptr) core_.keep_history();
     epochs_.reserve(kEpochsPerTick);
     studies_.reserve(config.studies.size());
@@ -150,6 +153,7 @@ class Estimator::Impl final : public EpochSink {
     const Eigen::Vector3d omega = to_eigen(sample.imu.omega_radps);
     regime_.add(omega, to_eigen(sample.imu.f_mps2), dt_s);
     watch_gravity(sample);
+    watch_noise(sample, dt_s);
     for (SImuFilter& study : studies_) study.add_reference(sample.time, omega.norm());
     navigation_.add_reference(sample);
     odometry_.process(sample.time, regime_.regime());
@@ -165,6 +169,17 @@ class Estimator::Impl final : public EpochSink {
     history_->on_history(
         {last_reference_, navigation_.navigating(), calibrating, core_, core_.accumulated()});
     core_.restart_accumulation();
+  }
+
+  // C-28
+  void watch_noise(const Sample& sample, double dt_s) noexcept {
+    if (config_.reference.is_known) return;
+    if (!resting_noise_.add(to_eigen(sample.imu.omega_radps), to_eigen(sample.imu.f_mps2), dt_s)) return;
+    const WhiteNoise& seen = *resting_noise_.seen();
+    for (SImuFilter& study : studies_) study.set_reference_noise(core_, seen);
+    if (std::exchange(noise_told_, true)) return;
+    log_.add(event::ReferenceNoiseSeen{seen.gyro_radps_per_sqrt_hz, seen.accel_mps2_per_sqrt_hz},
+             sample.device, sample.time);
   }
 
   void watch_gravity(const Sample& sample) noexcept {
@@ -224,6 +239,8 @@ class Estimator::Impl final : public EpochSink {
   NavigationFilter navigation_;
   OdometryFilter odometry_;
   RegimeDetector regime_;
+  RestingNoise resting_noise_;
+  bool noise_told_ = false;
   std::vector<SImuFilter> studies_;
   std::vector<SImuEpoch> epochs_;
   HostTime last_cut_{HostTime::min()};

@@ -34,6 +34,11 @@ struct NavigationStopped {
 struct ReferenceGap {
   double length_s;
 };
+/// Nobody said what noise the reference has; this is what it shows at rest, and what it is taken for from now on.
+struct ReferenceNoiseSeen {
+  double gyro_radps_per_sqrt_hz;
+  double accel_mps2_per_sqrt_hz;
+};
 /// At standstill the specific force along b's z axis is not -g: axes or sign convention.
 struct ReferenceGravityWrong {
   double f_z_b_mps2;
@@ -132,7 +137,7 @@ using EventPayload =
                  event::OdometryRejected, event::OdometryAccepted, event::CovarianceRepaired,
                  event::BoresightPriorWrong, event::LeverArmPriorWrong, event::SImusSwapped,
                  event::GyroBiasChanged, event::AccelBiasChanged, event::SImuInconsistent,
-                 event::NoiseTooSmall>;
+                 event::NoiseTooSmall, event::ReferenceNoiseSeen>;
 
 /// What happened, to which device, at which time on the host's scale.
 struct EstimatorEvent {

@@ -21,6 +21,8 @@ constexpr double kReturnAfter_s = 5.0;
 constexpr double kBlockGap_s = 0.1;
 /// The reference's noise is known to this share: what it takes of the lever arm is put right as far as that.
 constexpr double kNoiseKnown = 0.1;
+/// A reference that is noisier than it was taken for by this has had its noise taken for motion.
+constexpr double kMuchNoisier = 1.5;
 /// What a low-pass of its own, of 40 Hz as data sheets have it, takes of the motion that a sensor is to show:
 /// f^2 / (2 f_c^2), and vehicles as wholes move at 1.25 Hz. It looks like a scale.
 constexpr double kLowPass_hz = 40.0;
@@ -118,9 +120,13 @@ SImuFilter::SImuFilter(const EstimatorConfig& config, std::size_t index)
     : index_(index),
       config_(config.studies[index]),
       late_after_(config.late_after),
+      reference_rate_hz_(config.reference.rate_hz),
       gate_(axis_gate(config.gate_probability)),
-      rate_noise_radps_(config.reference.gyro_white_radps_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
+      rate_noise_radps_((config.reference.is_known ? config.reference.gyro_white_radps_per_sqrt_hz
+                                                   : kIndustrialGyroWhite_radps_per_sqrt_hz) *
+                        std::sqrt(config.reference.rate_hz)),
       force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
+      noise_known_to_(config.reference.is_known ? kNoiseKnown : 1.0),
       reference_grade_(config.reference.grade),
       increment_centre_(from_seconds(0.5 / config_.rate_hz)),
       has_biases_((config_.blocks & kBiasSImuBlocks) == kBiasSImuBlocks),
@@ -136,6 +142,24 @@ SImuFilter::SImuFilter(const EstimatorConfig& config, std::size_t index)
 
 void SImuFilter::set_window_noise() noexcept {
   motion_.set_noise(rate_noise_radps_, force_noise_mps2_, window_.now().gains);
+}
+
+// C-28
+void SImuFilter::set_reference_noise(FilterCore& core, const WhiteNoise& noise) noexcept {
+  noise_known_to_ = std::max(kNoiseKnown, noise.known_to);
+  const double per_sample = std::sqrt(reference_rate_hz_);
+  const double rate_noise_radps = noise.gyro_radps_per_sqrt_hz * per_sample;
+  const double ratio = rate_noise_radps / rate_noise_radps_;
+  if (std::abs(ratio * ratio - 1.0) < kNoiseKnown) return;
+  rate_noise_radps_ = rate_noise_radps;
+  force_noise_mps2_ = noise.accel_mps2_per_sqrt_hz * per_sample;
+  reference_grade_ = reference_grade(noise.gyro_radps_per_sqrt_hz);
+  // What was taken for motion was what the former noise left.
+  motion_.clear();
+  set_window_noise();
+  noise_share_ = noise_share_n_ = 0.0;
+  published_at_.reset();
+  if (calibrating_ && ratio > kMuchNoisier) start_again(core);
 }
 
 void SImuFilter::restart_windows() noexcept {
@@ -601,10 +625,15 @@ void SImuFilter::update_from_block(SImuContext& context, Triad triad, SImuEpoch&
   }
 }
 
-void SImuFilter::look_anew(FilterCore& core, HostTime now) noexcept {
+void SImuFilter::start_again(FilterCore& core) noexcept {
   ++output_.counters.resets;
   reset_to_prior(core, index_, config_);
   calibrating_ = false;
+  output_.status = CalibrationStatus::kWaiting;
+}
+
+void SImuFilter::look_anew(FilterCore& core, HostTime now) noexcept {
+  start_again(core);
   prior_in_force_ = false;
   coarse_t_d_s_ = 0.0;
   coarse_mounting_.clear();
@@ -710,7 +739,7 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
   Matrix3d psi_r = block(layout.psi, layout.r) + by_axes * block(layout.gyro_axes, layout.r);
   Matrix3d r = block(layout.r, layout.r);
   // C-22: the noise is known to a share, so the lever arm that it takes (1 - s of C-13) is, too.
-  const Vector3d attenuated = kNoiseKnown * noise_share_ * state.r_bs_b_m;
+  const Vector3d attenuated = noise_known_to_ * noise_share_ * state.r_bs_b_m;
   if (layout.r != SImuLayout::kAbsent) r += attenuated * attenuated.transpose();
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> covariance(output_.covariance_psi_r.data());
   // C-25

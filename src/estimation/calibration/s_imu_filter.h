@@ -17,6 +17,7 @@
 #include "estimation/calibration/filter_core.h"
 #include "estimation/calibration/mounting_monitor.h"
 #include "estimation/calibration/reference_axes.h"
+#include "estimation/calibration/resting_noise.h"
 #include "estimation/calibration/update_window.h"
 
 namespace imuscope {
@@ -50,6 +51,8 @@ class SImuFilter {
   void process(SImuContext& context, HostTime cut) noexcept;
 
   void set_noise(FilterCore& core, const SImuNoise& noise) noexcept;
+  /// The reference has shown its noise. C-28.
+  void set_reference_noise(FilterCore& core, const WhiteNoise& noise) noexcept;
   void update_output(const FilterCore& core, EventLog& log) noexcept;
   /// The mounting found contradicts what was configured.
   [[nodiscard]] bool contradicts_prior() const noexcept { return monitor_.contradicts_prior(); }
@@ -78,6 +81,8 @@ class SImuFilter {
   void try_coarse_alignment(SImuContext& context, HostTime now) noexcept;
   void begin(SImuContext& context, HostTime now, const Eigen::Matrix3d& C_b_s,
              const Eigen::Matrix3d& mounting_covariance, double t_d_s, double t_d_sd_s) noexcept;
+  /// What was found is worth nothing; what is configured still is.
+  void start_again(FilterCore& core) noexcept;
   /// The mounting has changed: all is forgotten that was found of it.
   void look_anew(FilterCore& core, HostTime now) noexcept;
   void predict(FilterCore& core, double dt_s) noexcept;
@@ -101,9 +106,11 @@ class SImuFilter {
   std::size_t index_;
   SImuConfig config_;
   Duration late_after_;
+  double reference_rate_hz_;
   double gate_;              ///< bound of y^2 / S of one axis
   double rate_noise_radps_;  ///< of one R sample
   double force_noise_mps2_;
+  double noise_known_to_;  ///< sd of the share of the reference's noise (C-22)
   ReferenceGrade reference_grade_;
   Eigen::Vector3d gyro_scale_by_reference_ = Eigen::Vector3d::Zero();  ///< sd, C-27
   Eigen::Vector3d accel_scale_by_reference_ = Eigen::Vector3d::Zero();

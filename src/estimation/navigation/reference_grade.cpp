@@ -24,7 +24,7 @@ constexpr double kIndustrialAxes_rad = 0.1 * kRadPerDeg;
 constexpr std::array<Known, 3> kKnown{
     {{0.005 * kPerRootHour, kNavigationGrade},
      {0.15 * kPerRootHour, {1e-3, 0.5 * kTacticalAxes_rad, kTacticalAxes_rad}},
-     {0.3 * kPerRootHour, {5e-3, 0.5 * kIndustrialAxes_rad, kIndustrialAxes_rad}}}};
+     {kIndustrialGyroWhite_radps_per_sqrt_hz, {5e-3, 0.5 * kIndustrialAxes_rad, kIndustrialAxes_rad}}}};
 
 }  // namespace
 

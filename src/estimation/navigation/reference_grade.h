@@ -3,6 +3,8 @@
 /// What the R-IMU's own axes may be off by beyond bias and noise. Whoever makes quieter gyros aligns and scales
 /// their axes better, too, so that the white noise of the gyros says what to expect. EQUATIONS.md N-29. Core.
 
+#include "base/units.h"
+
 namespace imuscope {
 
 /// Standard deviations. All zero: an ideal sensor.
@@ -15,6 +17,9 @@ struct ReferenceGrade {
 
 /// Navigation grade: what the best land vehicle references are, and none is taken to be better.
 inline constexpr ReferenceGrade kNavigationGrade{3e-4, 1.5e-4, 3e-4};
+
+/// Angle random walk of industrial MEMS, rad/sqrt(s): what a reference is taken for of which nothing is known.
+inline constexpr double kIndustrialGyroWhite_radps_per_sqrt_hz = 0.3 * kRadPerDeg / 60.0;
 
 /// N-29. @param gyro_white_radps_per_sqrt_hz  angle random walk, rad/sqrt(s), > 0
 [[nodiscard]] ReferenceGrade reference_grade(double gyro_white_radps_per_sqrt_hz) noexcept;

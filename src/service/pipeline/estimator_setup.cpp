@@ -30,7 +30,9 @@ ReferenceConfig reference_config(const Configuration& configuration) {
   const auto& noise = device.noise;
   if (noise.gyro_white_sd_radps)
     reference.gyro_white_radps_per_sqrt_hz = *noise.gyro_white_sd_radps * per_sqrt_hz;
-  reference.grade = reference_grade(reference.gyro_white_radps_per_sqrt_hz);
+  reference.is_known = noise.gyro_white_sd_radps || traits_of(device.protocol).has_optical_gyros;
+  reference.grade = reference_grade(reference.is_known ? reference.gyro_white_radps_per_sqrt_hz
+                                                       : kIndustrialGyroWhite_radps_per_sqrt_hz);
   if (noise.accel_white_sd_mps2)
     reference.accel_white_mps2_per_sqrt_hz = *noise.accel_white_sd_mps2 * per_sqrt_hz;
   set_reference_bias(noise.gyro_bias_sd_radps, noise.gyro_gm_sd_radps, noise.gyro_gm_tau_s,

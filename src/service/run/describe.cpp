@@ -44,6 +44,13 @@ struct EventSentence {
     return fmt::format("{}: reference silent for {:.3f} s; check its cable and baud rate if this repeats",
                        name, e.length_s);
   }
+  std::string operator()(const event::ReferenceNoiseSeen& e) const {
+    return fmt::format(
+        "{}: no [device.noise] says what it is; at rest it shows {:.2g} deg/sqrt(h) and {:.0f} ug/sqrt(Hz), and is taken for "
+        "that",
+        name, e.gyro_radps_per_sqrt_hz * kDegPerRad * std::sqrt(kSecondsPerHour),
+        e.accel_mps2_per_sqrt_hz / kMps2PerMicroG);
+  }
   std::string operator()(const event::ReferenceGravityWrong& e) const {
     return fmt::format(
         "{}: at standstill its specific force along b's z axis is {:+.2f} m/s^2 and should be near -9.8: "

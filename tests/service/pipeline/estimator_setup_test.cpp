@@ -41,8 +41,9 @@ void add(Answer& answer, const SImuConfig& s) {
 
 void add(Answer& answer, const EstimatorConfig& c) {
   const ReferenceConfig& r = c.reference;
-  answer.line("reference", r.device, r.rate_hz, r.differentiator_points, r.gyro_white_radps_per_sqrt_hz,
-              r.accel_white_mps2_per_sqrt_hz, r.grade.scale_sd, r.grade.triad_sd_rad);
+  answer.line("reference", r.device, r.rate_hz, r.differentiator_points, r.is_known,
+              r.gyro_white_radps_per_sqrt_hz, r.accel_white_mps2_per_sqrt_hz, r.grade.scale_sd,
+              r.grade.triad_sd_rad);
   add(answer, "gyro bias", r.gyro_bias);
   add(answer, "accel bias", r.accel_bias);
   const GnssConfig& g = c.gnss;

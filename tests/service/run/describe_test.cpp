@@ -48,6 +48,8 @@ TEST(Describe, SpeaksInTheUnitsOfPeople) {
   EXPECT_THAT(told(event::NoiseTooSmall{false, 3.1, 0.05}),
               HasSubstr("forces differ from the reference's by 3.1"));
   EXPECT_THAT(told(event::LeverArmPriorWrong{0.4}), HasSubstr("0.40 m from what"));
+  EXPECT_THAT(told(event::ReferenceNoiseSeen{0.3 * kRadPerDeg / 60.0, 200.0 * kMps2PerMicroG}, 0),
+              HasSubstr("0.3 deg/sqrt(h) and 200 ug/sqrt(Hz)"));
   EXPECT_THAT(told(event::ReferenceGap{0.25}, 0), HasSubstr("airins: reference silent for 0.250 s"));
 }
 
