@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/contracts.h"
+#include "base/units.h"
 
 namespace imuscope {
 namespace {
@@ -15,12 +16,15 @@ using Eigen::Vector3d;
 constexpr double kPiece_s = 0.1;
 /// Of a window, eight seconds: its 40 pairs, of three axes, show the noise's variance to an eighth.
 constexpr std::size_t kPieces = 80;
+constexpr double kSquares = 3.0 * kPieces / 2.0;
 /// From so many pieces on it is asked whether they are white.
 constexpr std::size_t kPiecesAtFirst = 40;
 /// Of what is white, pieces a second apart differ by no more than neighbours do; of what moves, by many times as much.
 constexpr double kWhite = 3.0;
 /// Windows that are as quiet as those before differ by less than this, by chance; what is quieter tells more than all before.
 constexpr double kAlike = 2.0;
+/// Twice an MTx's, the noisiest that anyone takes for a reference: what shows more is shaken.
+constexpr double kNoisiest_radps_per_sqrt_hz = 10.0 * kRadPerDeg / 60.0;
 constexpr double kGap = 1.5;  ///< in sample periods
 
 }  // namespace
@@ -77,26 +81,22 @@ bool RestingNoise::end_window() noexcept {
   const std::array<Triad*, 2> triads = {&gyro_, &accel_};
   const bool first = quiet_windows_ == 0;
   const auto shakes = [](const Triad* triad) { return triad->pairs > kAlike * triad->quiet; };
-  const bool counts = first || std::ranges::none_of(triads, shakes);
+  const bool counts =
+      density(gyro_.pairs) < kNoisiest_radps_per_sqrt_hz && (first || std::ranges::none_of(triads, shakes));
   if (counts) {
     const auto is_quieter = [](const Triad* triad) { return triad->pairs < triad->quiet / kAlike; };
     quiet_windows_ = first || std::ranges::any_of(triads, is_quieter) ? 1 : quiet_windows_ + 1;
-    for (Triad* triad : triads)
-      triad->quiet += (triad->pairs - triad->quiet) / static_cast<double>(quiet_windows_);
-    seen_ = as_noise();
+    const auto n = static_cast<double>(quiet_windows_);
+    for (Triad* triad : triads) triad->quiet += (triad->pairs - triad->quiet) / n;
+    seen_ = WhiteNoise{density(gyro_.quiet), density(accel_.quiet), std::sqrt(2.0 / (kSquares * n))};
   }
   restart();
   return counts;
 }
 
-WhiteNoise RestingNoise::as_noise() const noexcept {
-  constexpr double kDifferences = 3.0 * kPieces / 2.0;
+double RestingNoise::density(double pairs) const noexcept {
   const double piece_s = static_cast<double>(samples_per_piece_) / rate_hz_;
-  const auto density = [piece_s](const Triad& triad) {
-    return std::sqrt(0.5 * piece_s * triad.quiet / kDifferences);
-  };
-  return {density(gyro_), density(accel_),
-          std::sqrt(2.0 / (kDifferences * static_cast<double>(quiet_windows_)))};
+  return std::sqrt(0.5 * piece_s * pairs / kSquares);
 }
 
 }  // namespace imuscope

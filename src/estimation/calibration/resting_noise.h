@@ -45,7 +45,8 @@ class RestingNoise {
   void restart() noexcept;
   bool end_piece() noexcept;
   bool end_window() noexcept;
-  [[nodiscard]] WhiteNoise as_noise() const noexcept;
+  /// @param pairs  of a window
+  [[nodiscard]] double density(double pairs) const noexcept;
 
   double rate_hz_;
   std::size_t samples_per_piece_;

@@ -23,6 +23,8 @@ constexpr double kBlockGap_s = 0.1;
 constexpr double kNoiseKnown = 0.1;
 /// A reference that is noisier than it was taken for by this has had its noise taken for motion.
 constexpr double kMuchNoisier = 1.5;
+/// Unless it was no more than this share of the angular acceleration's power: no window is too noisy then (C-15).
+constexpr double kNoiseMatters = 0.03;
 /// What a low-pass of its own, of 40 Hz as data sheets have it, takes of the motion that a sensor is to show:
 /// f^2 / (2 f_c^2), and vehicles as wholes move at 1.25 Hz. It looks like a scale.
 constexpr double kLowPass_hz = 40.0;
@@ -154,11 +156,16 @@ void SImuFilter::set_reference_noise(FilterCore& core, const WhiteNoise& noise) 
   rate_noise_radps_ = rate_noise_radps;
   force_noise_mps2_ = noise.accel_mps2_per_sqrt_hz * per_sample;
   reference_grade_ = reference_grade(noise.gyro_radps_per_sqrt_hz);
+  published_at_.reset();
+  set_window_noise();
+  noise_share_ = motion_.noise_in_rate_slope();
+  noise_share_n_ = 1.0;
+  const bool mattered = noise_share_ > kNoiseMatters;
+  if (ratio > 1.0 && !mattered) return;
   // What was taken for motion was what the former noise left.
   motion_.clear();
   set_window_noise();
   noise_share_ = noise_share_n_ = 0.0;
-  published_at_.reset();
   if (calibrating_ && ratio > kMuchNoisier) start_again(core);
 }
 

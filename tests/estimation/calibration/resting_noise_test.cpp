@@ -131,6 +131,13 @@ TEST(RestingNoise, QuieterRestTellsMoreAndShakingNothing) {
   EXPECT_EQ(gyro_radps(), before);
 }
 
+TEST(RestingNoise, WhatIsNoisierThanAnyReferenceIsShaken) {
+  Noise noise(8);
+  RestingNoise resting(kReferenceRate_hz);
+  const auto by_hand = [&noise](double, Vector3d& omega, Vector3d&) { omega += noise(0.05); };
+  EXPECT_EQ(feed(resting, noise, 4.0 * kWindow_s, kReferenceRate_hz, by_hand), 0);
+}
+
 TEST(RestingNoise, AGapEndsAWindow) {
   Noise noise(6);
   RestingNoise resting(kReferenceRate_hz);
