@@ -75,7 +75,7 @@ struct ReferenceConfig {
   int differentiator_points = 5;
   double gyro_white_radps_per_sqrt_hz = 0.0015 * kRadPerDeg / 60.0;  ///< angle random walk, rad/sqrt(s)
   double accel_white_mps2_per_sqrt_hz = 10.0 * kMps2PerMicroG;       ///< velocity random walk
-  /// False: nobody said what it is. S-IMUs are held against it as against industrial MEMS, until it rests and shows its
+  /// False: nobody said how good it is. S-IMUs are held against it as against industrial MEMS, until it rests and shows its
   /// noise (C-28).
   bool is_known = true;
   GaussMarkovConfig gyro_bias{0.005 * kRadPerDeg / kSecondsPerHour, 3600.0};

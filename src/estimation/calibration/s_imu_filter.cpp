@@ -162,7 +162,7 @@ void SImuFilter::set_reference_noise(FilterCore& core, const WhiteNoise& noise) 
   noise_share_n_ = 1.0;
   const bool mattered = noise_share_ > kNoiseMatters;
   if (ratio > 1.0 && !mattered) return;
-  // What was taken for motion was what the former noise left.
+  // Powers of motion were taken less the former noise.
   motion_.clear();
   set_window_noise();
   noise_share_ = noise_share_n_ = 0.0;

@@ -46,8 +46,8 @@ struct EventSentence {
   }
   std::string operator()(const event::ReferenceNoiseSeen& e) const {
     return fmt::format(
-        "{}: no [device.noise] says what it is; at rest it shows {:.2g} deg/sqrt(h) and {:.0f} ug/sqrt(Hz), and is taken for "
-        "that",
+        "{}: no [device.noise] says how good it is; at rest it shows {:.2g} deg/sqrt(h) and {:.0f} ug/sqrt(Hz), and "
+        "mountings are found with that",
         name, e.gyro_radps_per_sqrt_hz * kDegPerRad * std::sqrt(kSecondsPerHour),
         e.accel_mps2_per_sqrt_hz / kMps2PerMicroG);
   }

@@ -257,7 +257,7 @@ void warn_of_no_navigation(const Configuration& configuration, const Snapshot& l
 const char* taken_for_navigation_grade(const Configuration& configuration) {
   const ImuNoiseConfig& noise = configuration.devices[configuration.reference_index()].noise;
   if (noise.gyro_white_sd_radps && noise.gyro_bias_sd_radps) return "";
-  return "without [device.noise] the reference is taken to be of navigation grade: if it is not, write what "
+  return "without [device.noise] the navigation takes the reference for navigation grade: if it is not, write what "
          "its data sheet says; else ";
 }
 
